@@ -1,7 +1,6 @@
 """What is wrong with a model description: a valid one is edited, and the fault is reported with its place."""
 
 import re
-import zipfile
 from pathlib import Path
 
 import pytest
@@ -67,69 +66,49 @@ def test_a_fault_is_reported_with_its_place(tmp_path: Path, old: str, new: str, 
     wording.check(findings_text(checked(tmp_path / "a.fmu", decay.edited((old, new)))))
 
 
-def test_all_faults_are_reported_together(tmp_path: Path):
+def test_all_faults_are_reported_together(tmp_path: Path, wording: Wording):
     edits = ('causality="input"', 'causality="imput"'), ('<Integer start="0"', '<Integer start="12"')
-    lines = findings_text(checked(tmp_path / "a.fmu", decay.edited(*edits, ('stepSize="0.1"', 'stepSize="0"'))))
-    for wanted in ("imput", "start value 12", "stepSize"):
-        assert wanted in lines
+    wording.check(findings_text(checked(tmp_path / "a.fmu", decay.edited(*edits, ('stepSize="0.1"', 'stepSize="0"')))))
 
 
-@pytest.mark.parametrize(
-    ("flag", "wanted"),
-    [
-        ("needsExecutionTool", "needs other software"),
-        ("canBeInstantiatedOnlyOncePerProcess", "allows one instance in a process"),
-    ],
-)
-def test_what_a_unit_needs_is_noted(tmp_path: Path, flag: str, wanted: str):
-    report = checked(tmp_path / "a.fmu", decay.edited(("<CoSimulation ", f'<CoSimulation {flag}="true" ')))
-    assert wanted in findings_text(report, Level.NOTE)
-    assert findings_text(report) == ""
+def test_what_a_unit_needs_is_noted(tmp_path: Path, wording: Wording):
+    for flag in ("needsExecutionTool", "canBeInstantiatedOnlyOncePerProcess"):
+        report = checked(tmp_path / "a.fmu", decay.edited(("<CoSimulation ", f'<CoSimulation {flag}="true" ')))
+        wording.check(findings_text(report, Level.NOTE))
+        assert findings_text(report) == ""
 
 
-def test_an_fmu_for_model_exchange_alone_is_reported(tmp_path: Path):
+def test_an_fmu_for_model_exchange_alone_is_reported(tmp_path: Path, wording: Wording):
     edits = ("CoSimulation", "ModelExchange"), ('canHandleVariableCommunicationStepSize="true" ', "")
     report = checked(tmp_path / "a.fmu", decay.edited(*edits))
-    assert "an FMU for model exchange, without a co-simulation interface" in findings_text(report)
+    wording.check(findings_text(report))
     assert [s.reached for s in report.sections] == [True, True, True, False, False, False]
 
 
-def edited_copy(fmu: Path, file: Path, old: str, new: str) -> Path:
-    def rewrite(name: str, content: bytes) -> bytes | None:
-        if name == DESCRIPTION:
-            assert old.encode() in content
-            return content.replace(old.encode(), new.encode())
-        return None if name.startswith("binaries/") else content
-
-    return rewritten(fmu, file, rewrite)
-
-
 @pytest.mark.parametrize(
-    ("old", "new", "wanted"),
+    ("old", "new", "level"),
     [
-        ('fmiVersion="3.0"', 'fmiVersion="3.0-beta.2"', None),
-        ('causality="independent"', 'causality="local"', r'independent variable must be defined; one Float64 with'),
-        ('<Dimension start="2" />', '<Dimension valueReference="999" />', r"dimension has the value reference 999"),
-        ('name="pair_back" valueReference="', 'name="pair_back" valueReference="9', r"9\d* leads to no|not list"),
-        ('<Item name="GREEN" value="2"', '<Item name="GREEN" value="1"', r"type '\w+' \(line \d+\) has a value twice"),
+        ('fmiVersion="3.0"', 'fmiVersion="3.0-beta.2"', Level.WARNING),
+        ('causality="independent"', 'causality="local"', Level.FAULT),
+        ('<Dimension start="2" />', '<Dimension valueReference="999" />', Level.FAULT),
+        ('name="pair_back" valueReference="', 'name="pair_back" valueReference="9', Level.FAULT),
+        ('<Item name="GREEN" value="2"', '<Item name="GREEN" value="1"', Level.FAULT),
+        ('name="pair" valueReference="', 'start="1 2 3" name="pair" valueReference="', Level.FAULT),
     ],
-)  # fmt: skip
-def test_faults_of_fmi_3_are_reported(fmu: FmuOf, tmp_path: Path, old: str, new: str, wanted: str | None):
-    report = check_fmu(edited_copy(fmu("Echo"), tmp_path / "a.fmu", old, new), 30.0)
-    if wanted:
-        assert re.search(wanted, findings_text(report)), findings_text(report)
-    else:
-        assert "a draft of the standard" in findings_text(report, Level.WARNING)
+    ids=["draft", "no time", "dimension of none", "not listed", "value twice", "start of another shape"],
+)
+def test_faults_of_fmi_3_are_reported(fmu: FmuOf, tmp_path: Path, old: str, new: str, level: Level, wording: Wording):
+    def rewrite(name: str, content: bytes) -> bytes | None:
+        if name != DESCRIPTION:
+            return None if name.startswith("binaries/") else content
+        text = content.decode()
+        if "start=" in new:
+            text = re.sub(r'(name="pair"[^>]*) start="[^"]*"', r"\1", text)
+        assert old in text
+        return text.replace(old, new).encode()
 
-
-def test_start_values_must_fit_the_dimensions(fmu: FmuOf, tmp_path: Path):
-    with zipfile.ZipFile(fmu("Echo")) as archive:
-        description = archive.read("modelDescription.xml").decode()
-    start = re.search(r'name="pair"[^>]*start="([^"]*)"', description)
-    assert start
-    old = f'start="{start[1]}"'
-    report = check_fmu(edited_copy(fmu("Echo"), tmp_path / "a.fmu", old, 'start="1 2 3"'), 30.0)
-    assert "3 start values for 2 entries, shape [2]" in findings_text(report)
+    report = check_fmu(rewritten(fmu("Echo"), tmp_path / "a.fmu", rewrite), 30.0)
+    wording.check(findings_text(report, level))
 
 
 VALUES = re.findall(r'"([^"]*)"', decay.DESCRIPTION.partition("?>")[2])
@@ -138,7 +117,7 @@ ODD = st.sampled_from(
 )
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=30)
 @given(
     edits=st.lists(st.tuples(st.integers(0, len(VALUES) - 1), ODD | st.text("abc<>&'{}\t 01.", max_size=5)), max_size=4)
 )

@@ -8,6 +8,7 @@ import fmpy
 import pytest
 from support.cosim import decay
 from support.forked_probes import ForkedProbes
+from support.wording import Wording
 
 from handover.cosim.check.check_fmu import check_fmu
 from handover.cosim.check.load_probe import load_fault
@@ -41,24 +42,24 @@ def test_a_sound_unit_passes(decay_library: bytes, tmp_path: Path, monkeypatch: 
 
 
 @pytest.mark.parametrize(
-    ("mode", "level", "wanted"),
+    ("mode", "level"),
     [
-        ("aborts", Level.FAULT, "crashed with SIGABRT in fmi2DoStep at t = 0.2 s: it gave up"),
-        ("segmentation_fault", Level.FAULT, "crashed with SIGSEGV in fmi2EnterInitializationMode"),
-        ("not_a_number", Level.FAULT, "output 'y' at t = 0.3 s: not finite: nan"),
-        ("answers_error", Level.FAULT, "fmi2DoStep at t = 0.2 s answered Error\n[Error] the solver failed at t = 0.2"),
-        ("discards", Level.FAULT, "fmi2DoStep at t = 0.2 s answered Discard"),
-        ("forgets_in_state", Level.FAULT, "fmi2SetFMUstate: steps from a restored state (t = 0.5 s) give other"),
-        ("exits", Level.FAULT, "ended its process with status 0 in fmi2DoStep at t = 0.2 s"),
-        ("shares_memory", Level.FAULT, "a second instance: its steps changed the first one's outputs: y"),
-        ("does_not_reset", Level.WARNING, "fmi2Reset: a reset unit starts with other outputs than a new one: y"),
-        ("out_of_range", Level.WARNING, "output 'y' at t = 0.3 s: 1e+06 is out of its declared range"),
+        ("aborts", Level.FAULT),
+        ("segmentation_fault", Level.FAULT),
+        ("not_a_number", Level.FAULT),
+        ("answers_error", Level.FAULT),
+        ("discards", Level.FAULT),
+        ("forgets_in_state", Level.FAULT),
+        ("exits", Level.FAULT),
+        ("shares_memory", Level.FAULT),
+        ("does_not_reset", Level.WARNING),
+        ("out_of_range", Level.WARNING),
     ],
-)  # fmt: skip
-def test_a_spoilt_run_is_reported(decay_library: bytes, tmp_path: Path, mode: str, level: Level, wanted: str):
+)
+def test_a_spoilt_run_is_reported(decay_library: bytes, tmp_path: Path, mode: str, level: Level, wording: Wording):
     found, lines = told(checked(tmp_path, decay_library, decay.spoilt(mode)), "run")
     assert found is level
-    assert wanted in lines
+    wording.check(lines)
 
 
 def test_a_run_that_hangs_is_ended(decay_library: bytes, tmp_path: Path, probes: ForkedProbes):
@@ -144,22 +145,19 @@ def test_a_function_that_no_library_has_is_named(tmp_path: Path):
     assert "it uses the function other, which is neither in it nor in a library that it names" in lines
 
 
-@pytest.mark.parametrize(
-    ("message", "wanted"),
-    [
-        ("/lib/libm.so.6: version `GLIBC_2.99' not found (required by /tmp/x.so)", "it needs GLIBC_2.99, which"),
-        ("/tmp/x.so: wrong ELF class: ELFCLASS32", "another processor"),
-        ("libgomp.so.3: cannot open shared object file: No such file or directory", "shared library libgomp.so.3"),
-        ("dlopen(x.dylib, 6): Library not loaded: @rpath/libz.dylib\n Referenced from: x", "shared library libz.dylib"),
-        ("[WinError 126] The specified module could not be found", "a shared library that it needs"),
-        ("[WinError 193] %1 is not a valid Win32 application", "another processor"),
-        ("something else", "the system does not load it"),
-    ],
-)  # fmt: skip
-def test_the_linker_is_translated(message: str, wanted: str):
-    finding = load_fault(message, "x.so")
-    assert wanted in finding.line
-    assert finding.log == (message,)
+def test_the_linker_is_translated(wording: Wording):
+    for message in (
+        "/lib/libm.so.6: version `GLIBC_2.99' not found (required by /tmp/x.so)",
+        "/tmp/x.so: wrong ELF class: ELFCLASS32",
+        "libgomp.so.3: cannot open shared object file: No such file or directory",
+        "dlopen(x.dylib, 6): Library not loaded: @rpath/libz.dylib\n Referenced from: x",
+        "[WinError 126] The specified module could not be found",
+        "[WinError 193] %1 is not a valid Win32 application",
+        "something else",
+    ):
+        finding = load_fault(message, "x.so")
+        assert finding.log == (message,)
+        wording.check(finding.line)
 
 
 def test_a_library_for_another_machine_is_reported(decay_library: bytes, tmp_path: Path):

@@ -1,10 +1,12 @@
+"""Archives: what is unpacked, what is refused before anything is, icons, and what is written."""
+
 import contextlib
 import gc
 import io
 import os
-import struct
 import sys
 import tracemalloc
+import warnings
 import zipfile
 import zlib
 from collections.abc import Callable
@@ -17,6 +19,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from support.cosim.native_units import native_fmu
+from support.wording import Wording
 
 from handover.cosim.exceptions import InvalidFmu
 from handover.cosim.fmu.file.archive import FmuArchive, archive_faults, write_archive
@@ -28,34 +31,37 @@ from handover.cosim.system.system import System
 PLAIN = {"modelDescription.xml": b"<fmiModelDescription/>" * 20, "resources/table.csv": b"1,2,3\n" * 100}
 
 
-def packed(*names: str, adjust: Callable[[zipfile.ZipInfo], None] = lambda _: None) -> bytes:
+def packed(
+    *names: str, adjust: Callable[[zipfile.ZipInfo], None] = lambda _: None, twice: tuple[bytes, ...] = ()
+) -> bytes:
+    """Return an archive with further members, one of them perhaps there with several contents."""
     content = io.BytesIO()
-    with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
+    with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive, warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of names that are there twice
         for name in (*PLAIN, *names):
             member = zipfile.ZipInfo(name)
             member.compress_type = zipfile.ZIP_DEFLATED
             if name in names:
                 adjust(member)
             archive.writestr(member, PLAIN.get(name, b"x"))
+        for data in twice:
+            archive.writestr("resources/a", data)
     return content.getvalue()
 
 
-def refusal(folder: Path, content: bytes) -> str:
-    """Return why an archive is rejected; nothing may have been unpacked."""
-    file, target = folder / "a.fmu", folder / "target"
-    file.write_bytes(content)
-    with pytest.raises(InvalidFmu) as caught:
-        FmuArchive(file).unpack(target)
-    assert not target.exists()
-    return caught.value.fault
-
-
 def test_a_sound_archive_is_unpacked(tmp_path: Path):
-    file = tmp_path / "a.fmu"
-    file.write_bytes(packed("binaries/", "binaries/x86_64-linux/größe.so"))
-    FmuArchive(file).unpack(tmp_path / "target")
-    assert (tmp_path / "target" / "resources" / "table.csv").read_bytes() == PLAIN["resources/table.csv"]
-    assert (tmp_path / "target" / "binaries" / "x86_64-linux" / "größe.so").read_bytes() == b"x"
+    file, target = tmp_path / "a.fmu", tmp_path / "target"
+    names = ("binaries/", "binaries/x86_64-linux/größe.so", "./", "other\\", "other\\win64\\x.dll")
+    file.write_bytes(packed(*names, twice=(b"same", b"same")))
+    archive = FmuArchive(file)
+    archive.unpack(target)
+    assert (target / "resources" / "table.csv").read_bytes() == PLAIN["resources/table.csv"]
+    assert (target / "binaries" / "x86_64-linux" / "größe.so").read_bytes() == b"x"
+    assert archive.read("other/win64/x.dll") == (target / "other" / "win64" / "x.dll").read_bytes() == b"x"
+    assert archive.with_backslashes == names[-2:]
+    assert archive.names.count("resources/a") == 1
+    assert (target / "resources" / "a").read_bytes() == b"same"
+    assert "./" not in archive.names
 
 
 @pytest.mark.skipif(os.name == "nt", reason="files have no such permission there")
@@ -67,114 +73,49 @@ def test_programs_may_be_executed_after_unpacking(tmp_path: Path):
     assert executable == ["binaries/unit.so", "resources/program"]
 
 
-@pytest.mark.parametrize(
-    "name", ["../x", "a/../../x", "/etc/x", "C:/x", "C:x", "..\\x", "a\\..\\..\\b", "..", "\\\\host\\share\\x", "."]
-)
-def test_a_path_that_leads_out_is_refused(tmp_path: Path, name: str):
-    value = refusal(tmp_path, packed(name))
-    assert "paths that lead out of it" in value
-    assert name in value
+def link(member: zipfile.ZipInfo) -> None:
+    member.create_system, member.external_attr = 3, 0o120777 << 16
 
 
-def test_backslashes_in_names_are_read_as_slashes(tmp_path: Path):
-    file = tmp_path / "a.fmu"
-    file.write_bytes(packed("binaries\\", "binaries\\win64\\x.dll"))
-    archive = FmuArchive(file)
-    archive.unpack(tmp_path / "target")
-    assert archive.read("binaries/win64/x.dll") == (tmp_path / "target" / "binaries" / "win64" / "x.dll").read_bytes()
-    assert archive.with_backslashes == ("binaries\\", "binaries\\win64\\x.dll")
-    (tmp_path / "other").mkdir()
-    assert "the same path twice" in refusal(tmp_path / "other", packed("resources\\table.csv"))
+def changed(content: bytes, *changes: tuple[bytes, int, int]) -> bytes:
+    """Return an archive in which a byte, some bytes after the last place of a text, is another by these bits."""
+    made = bytearray(content)
+    for text, after, bits in changes:
+        made[made.rindex(text) + after] ^= bits
+    return bytes(made)
 
 
-def test_links_are_refused(tmp_path: Path):
-    def link(member: zipfile.ZipInfo) -> None:
-        member.create_system, member.external_attr = 3, 0o120777 << 16
-
-    assert "symbolic links" in refusal(tmp_path, packed("binaries/x", adjust=link))
-
-
-@pytest.mark.filterwarnings("ignore:Duplicate name")
-@pytest.mark.parametrize(("first", "second"), [(b"x", b"y"), (b"x", b"xx"), (b"x" * 10, b"y" * 10)])
-def test_one_path_twice_with_different_contents_is_refused(tmp_path: Path, first: bytes, second: bytes):
-    assert "the same path twice, with different contents: resources/a" in refusal(tmp_path, doubled(first, second))
-
-
-@pytest.mark.filterwarnings("ignore:Duplicate name")
-def test_contents_of_one_length_and_checksum_are_compared_byte_by_byte(tmp_path: Path):
-    """Whoever makes two such contents must not be able to show one and unpack the other."""
-    assert zlib.crc32(b"plumless") == zlib.crc32(b"buckeroo")
-    content = doubled(b"plumless", b"buckeroo")
-    assert "the same path twice, with different contents: resources/a" in refusal(tmp_path, content)
-
-
-@pytest.mark.filterwarnings("ignore:Duplicate name")
-def test_one_path_twice_with_the_same_content_is_unpacked_once(tmp_path: Path):
-    file = tmp_path / "a.fmu"
-    file.write_bytes(doubled(b"same", b"same"))
-    archive = FmuArchive(file)
-    archive.unpack(tmp_path / "target")
-    assert archive.names.count("resources/a") == 1
-    assert (tmp_path / "target" / "resources" / "a").read_bytes() == b"same"
+ABSOLUTE = ("/etc/x", "C:/x", "C:x", "\\\\host\\share\\x")
+UPWARDS = ("../x", "a/../../x", "..\\x", "a\\..\\..\\b", "..", ".")
+SECRET = changed(packed("secret"), (b"PK\x01\x02", 8, 1), (b"PK\x03\x04", 6, 1))
+REFUSED = {
+    **{name: packed(name) for name in (*ABSOLUTE, *UPWARDS)},
+    "link": packed("binaries/x", adjust=link),
+    "twice by backslash": packed("resources\\table.csv"),
+    "twice by the folder itself": packed("./resources/table.csv"),
+    "twice with another byte": packed(twice=(b"x", b"y")),
+    "twice with another length": packed(twice=(b"x", b"xx")),
+    "twice with one checksum": packed(twice=(b"plumless", b"buckeroo")),
+    "file and folder": packed("a", "a/b/c"),
+    "two kinds of faults": packed("../x", "a", "a/b"),
+    "encrypted": SECRET,
+    "unknown compression": changed(packed("odd"), (b"PK\x01\x02", 10, 99 ^ zipfile.ZIP_DEFLATED)),
+    "damaged member": changed(packed("z_last"), (b"z_last\xab", 6, 0xFF)),
+    "empty": b"",
+    "another format": b"\x7fELF and so on",
+    "cut off": packed()[:200],
+}
 
 
-def doubled(*contents: bytes) -> bytes:
-    made = io.BytesIO(packed())
-    with zipfile.ZipFile(made, "a", zipfile.ZIP_DEFLATED) as archive:
-        for content in contents:
-            archive.writestr("resources/a", content)
-    return made.getvalue()
-
-
-def test_an_entry_of_the_folder_itself_is_harmless(tmp_path: Path):
-    file = tmp_path / "a.fmu"
-    file.write_bytes(packed("./"))
-    archive = FmuArchive(file)
-    archive.unpack(tmp_path / "target")
-    assert "./" not in archive.names
-    assert (tmp_path / "target" / "resources" / "table.csv").is_file()
-
-
-def test_a_file_that_is_also_a_folder_is_refused(tmp_path: Path):
-    assert "files that are folders of other files: a" in refusal(tmp_path, packed("a", "a/b/c"))
-
-
-def test_all_kinds_of_faults_are_reported_together(tmp_path: Path):
-    value = refusal(tmp_path, packed("../x", "a", "a/b"))
-    assert "paths that lead out" in value
-    assert "folders of other files" in value
-
-
-def test_encrypted_members_are_refused(tmp_path: Path):
-    content = bytearray(packed("secret"))
-    for signature, at in ((b"PK\x01\x02", 8), (b"PK\x03\x04", 6)):
-        begin = content.rindex(signature)
-        content[begin + at] |= 1
-    assert "encrypted files; store them without a password: secret" in refusal(tmp_path, bytes(content))
-
-
-def test_a_compression_that_nobody_knows_is_refused(tmp_path: Path):
-    content = bytearray(packed("odd"))
-    struct.pack_into("<H", content, content.rindex(b"PK\x01\x02") + 10, 99)
-    assert "compression that cannot be read; use deflate: odd" in refusal(tmp_path, bytes(content))
-
-
-def test_a_damaged_member_is_refused_before_anything_is_unpacked(tmp_path: Path):
-    content = bytearray(packed("z_last"))
-    content[content.index(b"z_last") + len("z_last")] ^= 0xFF
-    assert "the archive is damaged" in refusal(tmp_path, bytes(content))
-
-
-@pytest.mark.parametrize(
-    ("content", "value"),
-    [
-        (b"", "the file is empty"),
-        (b"\x7fELF and so on", "this file is not one"),
-        (packed()[:200], "its end is missing"),
-    ],
-)
-def test_what_is_no_archive_is_refused(tmp_path: Path, content: bytes, value: str):
-    assert value in refusal(tmp_path, content)
+@pytest.mark.parametrize("content", REFUSED.values(), ids=REFUSED)
+def test_it_is_refused_before_anything_is_unpacked(tmp_path: Path, content: bytes, wording: Wording):
+    assert zlib.crc32(b"plumless") == zlib.crc32(b"buckeroo")  # must not be shown as one and unpacked as the other
+    file, target = tmp_path / "a.fmu", tmp_path / "target"
+    file.write_bytes(content)
+    with pytest.raises(InvalidFmu) as caught:
+        FmuArchive(file).unpack(target)
+    assert not target.exists()
+    wording.check(caught.value)
 
 
 def declared(size: int, name: str = "a") -> zipfile.ZipInfo:
@@ -183,14 +124,11 @@ def declared(size: int, name: str = "a") -> zipfile.ZipInfo:
     return member
 
 
-def test_a_zip_bomb_is_refused_by_what_it_declares(monkeypatch: pytest.MonkeyPatch):
-    assert "zip bomb: 1.0 MiB would unpack to 1024 MiB" in archive_faults([declared(1 << 30)], 1 << 20)[0]
-    assert "at most 16 GiB are unpacked" in archive_faults([declared(1 << 40)], 1 << 38)[0]
+def test_a_zip_bomb_is_refused_by_what_it_declares(monkeypatch: pytest.MonkeyPatch, wording: Wording):
+    wording.check(archive_faults([declared(1 << 30)], 1 << 20)[0])
+    wording.check(archive_faults([declared(1 << 40)], 1 << 38)[0])
     monkeypatch.setattr("handover.cosim.fmu.file.archive._MAX_FILES", 1000)
-    assert "at most 1000 are unpacked" in archive_faults([declared(1, str(i)) for i in range(1001)], 1 << 30)[0]
-
-
-def test_large_and_dense_archives_are_not_taken_for_bombs():
+    wording.check(archive_faults([declared(1, str(i)) for i in range(1001)], 1 << 30)[0])
     assert archive_faults([declared(2 << 30)], 200 << 20) == []
     assert archive_faults([declared(200 << 20)], 1 << 18) == []  # a table of zeros
 
@@ -203,29 +141,23 @@ def test_a_bomb_costs_no_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
             bomb.write(bytes(1 << 20))
     tracemalloc.start()
     try:
-        with pytest.raises(InvalidFmu, match="zip bomb"):
+        with pytest.raises(InvalidFmu):
             FmuArchive(file)
         assert tracemalloc.get_traced_memory()[1] < 1 << 20
     finally:
         tracemalloc.stop()
 
 
-@pytest.mark.parametrize(
-    ("names", "value"),
-    [
-        (["unit/modelDescription.xml"], "zip what is in that folder, not the folder"),
-        (["ModelDescription.xml"], "there is ModelDescription.xml; upper and lower case count"),
-        (["readme.txt"], "the archive holds readme.txt"),
-        ([], "the archive holds nothing"),
-    ],
-)
-def test_a_missing_description_is_reported_with_what_is_there(tmp_path: Path, names: list[str], value: str):
-    file = tmp_path / "a.fmu"
-    with zipfile.ZipFile(file, "w") as archive:
-        for name in names:
-            archive.writestr(name, b"")
-    with pytest.raises(InvalidFmu, match=value):
-        FmuArchive(file).description()
+def test_what_has_no_description_is_refused_with_what_is_there(tmp_path: Path, wording: Wording):
+    contents = (["unit/modelDescription.xml"], ["ModelDescription.xml"], ["readme.txt"], [])
+    for path in (*contents, tmp_path, Path(os.devnull)):
+        if isinstance(path, list):
+            with zipfile.ZipFile(tmp_path / "a.fmu", "w") as archive:
+                for name in path:
+                    archive.writestr(name, b"")
+        with pytest.raises(InvalidFmu) as caught:
+            FmuArchive(path if isinstance(path, Path) else tmp_path / "a.fmu").description()
+        wording.check(caught.value)
 
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=100)
@@ -242,16 +174,9 @@ def test_whatever_happens_to_an_archive_it_is_unpacked_or_refused(tmp_path: Path
         archive.unpack(target)
 
 
-def test_what_is_no_file_is_reported(tmp_path: Path):
-    for path, value in ((tmp_path, "at the top of the folder"), (Path(os.devnull), "not a regular file")):
-        with pytest.raises(InvalidFmu, match=value):
-            FmuArchive(path).description()
-
-
-@pytest.mark.parametrize("fmi", [2, 3])
-def test_an_fmu_whose_paths_begin_at_the_folder_itself_runs(tmp_path: Path, fmi: int):
+def test_an_fmu_whose_paths_begin_at_the_folder_itself_runs(tmp_path: Path):
     dotted = tmp_path / "dotted.fmu"
-    with zipfile.ZipFile(native_fmu("gain", fmi)) as plain, zipfile.ZipFile(dotted, "w") as archive:
+    with zipfile.ZipFile(native_fmu("gain", 3)) as plain, zipfile.ZipFile(dotted, "w") as archive:
         for name in plain.namelist():
             archive.writestr(f"./{name}", plain.read(name))
     assert set(FmuArchive(dotted).names) >= {"modelDescription.xml"}
@@ -260,12 +185,6 @@ def test_an_fmu_whose_paths_begin_at_the_folder_itself_runs(tmp_path: Path, fmi:
     with Master(system) as master:
         master.run(Fraction(1))
     assert problems_of(dotted) == ([], "")
-
-
-def test_a_path_twice_with_and_without_the_folder_itself_has_one_content(tmp_path: Path):
-    assert "the same path twice, with different contents: resources/table.csv" in refusal(
-        tmp_path, packed("./resources/table.csv")
-    )
 
 
 BEGIN, END = b"\x89PNG\r\n\x1a\n", b"IEND\xaeB`\x82"
@@ -356,7 +275,7 @@ def test_an_interrupt_leaves_nothing_and_says_nothing(tmp_path: Path, monkeypatc
     assert path.stat().st_mode & 0o777 == 0o644
 
 
-def test_the_bytes_are_those_that_pythons_zipfile_writes(tmp_path: Path):
+def test_the_bytes_are_those_that_pythons_zipfile_writes_whatever_order_members_come_in(tmp_path: Path):
     expected = io.BytesIO()
     with zipfile.ZipFile(expected, "w", zipfile.ZIP_DEFLATED) as archive:
         for name in sorted(FILES):
@@ -364,10 +283,5 @@ def test_the_bytes_are_those_that_pythons_zipfile_writes(tmp_path: Path):
             member.compress_type, member.create_system = zipfile.ZIP_DEFLATED, 3
             member.external_attr = (0o755 if name.startswith("binaries/") else 0o644) << 16
             archive.writestr(member, FILES[name])
-    assert write_archive(tmp_path / "x.fmu", FILES).read_bytes() == expected.getvalue()
-
-
-def test_a_file_is_the_same_whatever_order_its_members_come_in(tmp_path: Path):
-    one = write_archive(tmp_path / "one.fmu", FILES).read_bytes()
-    other = write_archive(tmp_path / "other.fmu", dict(reversed(FILES.items()))).read_bytes()
-    assert one == other
+    for files in (FILES, dict(reversed(FILES.items()))):
+        assert write_archive(tmp_path / "x.fmu", files).read_bytes() == expected.getvalue()

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from fractions import Fraction
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pytest
 from support.cosim.both_paths import PLAIN
@@ -27,39 +28,37 @@ COMPILED = pytest.mark.parametrize("compiled", [False, True], ids=["general", "p
 algorithms = pytest.mark.parametrize("algorithm", PLAIN)
 
 
-@COMPILED
-@algorithms
-@pytest.mark.parametrize("fmi", [2, 3])
-@pytest.mark.parametrize("isolated", [("all",), ("first",)])
-def test_two_units_meet_in_their_steps(
-    isolated: tuple[str, ...], fmi: int, algorithm: Algorithm, compiled: bool, tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-):  # fmt: skip
-    """In one process neither would ever return; one of them may be in this process, while the other one steps."""
-    monkeypatch.setenv("MEETING_FOLDER", str(tmp_path))
+def expect_meeting(fmi: int, options: MasterOptions) -> None:
+    """Expect two units to meet in their steps: in one process neither would ever return."""
     s = System()
     first, second = s.add("first", native_fmu("meets", fmi), who=0), s.add("second", native_fmu("meets", fmi), who=1)
     third = s.add("third", native_fmu("hub", fmi))
     s.connect(first.y.y, third.u.u1)
     s.connect(second.y.y, third.u.u2)
-    with Master(s, MasterOptions(algorithm=algorithm, compiled=compiled, isolated=isolated)) as master:
-        master.run(Fraction(1, 2))
-        assert [int(master.signals[f"{name}.n"]) for name in ("first", "second")] == [5, 5]
-
-
-def test_with_events_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setenv("MEETING_FOLDER", str(tmp_path))
-    s = System()
-    for who, name in enumerate(("first", "second")):
-        s.add(name, native_fmu("meets"), who=who)
-    with Master(s, MasterOptions(isolated=("all",), repeat_discarded=True)) as master:
+    with Master(s, options) as master:
         master.run(Fraction(1, 2))
         assert [int(master.signals[f"{name}.n"]) for name in ("first", "second")] == [5, 5]
 
 
 @COMPILED
 @algorithms
-@pytest.mark.parametrize("isolated", [("all",), ("first",), ("second",), ("first", "third")])
+@pytest.mark.parametrize(("fmi", "isolated"), [(2, ("all",)), (3, ("first",))])
+def test_two_units_step_at_the_same_time(
+    fmi: int, isolated: tuple[str, ...], algorithm: Algorithm, compiled: bool, tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+):  # fmt: skip
+    monkeypatch.setenv("MEETING_FOLDER", str(tmp_path))
+    expect_meeting(fmi, MasterOptions(algorithm=algorithm, compiled=compiled, isolated=isolated))
+
+
+def test_with_events_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("MEETING_FOLDER", str(tmp_path))
+    expect_meeting(3, MasterOptions(isolated=("all",), repeat_discarded=True))
+
+
+@COMPILED
+@algorithms
+@pytest.mark.parametrize("isolated", [("second",), ("first", "third")])
 def test_of_two_failures_that_of_one_process_is_raised(
     isolated: tuple[str, ...], algorithm: Algorithm, compiled: bool
 ):  # fmt: skip
@@ -81,40 +80,35 @@ def test_of_two_failures_that_of_one_process_is_raised(
 
 
 STEPS = 10
-WAYS = [(algorithm, compiled) for algorithm in (Algorithm.JACOBI, Algorithm.GAUSS_SEIDEL) for compiled in (False, True)]
 
 
-def cpu_seconds(fmi: int, isolated: tuple[str, ...], algorithm: Algorithm, compiled: bool) -> dict[str, float]:
+def cpu_seconds(fmi: int, **options: Any) -> dict[str, float]:
     """Return the CPU time of a heavy unit's steps and of a light one's that it feeds."""
     system = System()
     heavy = system.add("heavy", native_fmu("heavy", fmi), work=500)
     light = system.add("light", native_fmu("heavy", fmi), work=0)
     system.connect(heavy.y.y, light.u.u)
-    options = MasterOptions(algorithm=algorithm, compiled=compiled, isolated=isolated, cpu_times=True)
-    with Master(system, options) as master:
+    with Master(system, MasterOptions(cpu_times=True, **options)) as master:
         master.run(Fraction(STEPS, 10))
-        cpu = master.cpu
-        assert {name: len(spent) for name, spent in cpu.items()} == dict.fromkeys(("heavy", "light"), STEPS)
-        return {name: sum(spent) for name, spent in cpu.items()}
+        assert {name: len(spent) >= STEPS for name, spent in master.cpu.items()} == {"heavy": True, "light": True}
+        return {name: sum(spent) for name, spent in master.cpu.items()}
 
 
-@pytest.mark.parametrize("fmi", [2, 3])
-@pytest.mark.parametrize(("algorithm", "compiled"), WAYS)
-def test_cpu_time_of_an_isolated_unit_counts(fmi: int, algorithm: Algorithm, compiled: bool):
-    here = cpu_seconds(fmi, (), algorithm, compiled)
-    alone = cpu_seconds(fmi, ("all",), algorithm, compiled)
+@pytest.mark.parametrize(
+    ("fmi", "options"),
+    [
+        (2, {"algorithm": Algorithm.GAUSS_SEIDEL}),
+        (3, {"algorithm": Algorithm.GAUSS_SEIDEL, "compiled": False}),
+        (3, {"algorithm": Algorithm.JACOBI}),
+        (2, {"algorithm": Algorithm.JACOBI, "compiled": False}),
+        (3, {"repeat_discarded": True}),
+    ],
+)
+def test_cpu_time_of_an_isolated_unit_counts(fmi: int, options: dict[str, Any]):
+    here, alone = cpu_seconds(fmi, **options), cpu_seconds(fmi, isolated=("all",), **options)
     assert here["heavy"] > 0.01
     assert 0.4 * here["heavy"] < alone["heavy"] < 2.5 * here["heavy"]
     assert alone["light"] < 0.2 * alone["heavy"]
-
-
-def test_the_same_where_steps_may_end_anywhere():
-    options = MasterOptions(isolated=("heavy",), cpu_times=True, repeat_discarded=True)
-    system = System()
-    system.add("heavy", native_fmu("heavy"), work=500)
-    with Master(system, options) as master:
-        master.run(Fraction(STEPS, 10))
-        assert sum(master.cpu["heavy"]) > 0.01
 
 
 class Listener(Heartbeat):
@@ -193,8 +187,7 @@ def together(fmu: FmuOf) -> Callable[[Algorithm], list[object]]:
     ("algorithm", "compiled"),
     [
         (Algorithm.GAUSS_SEIDEL, True),
-        (Algorithm.JACOBI, False),
-        pytest.param(Algorithm.GAUSS_SEIDEL, False, marks=pytest.mark.slow),
+        pytest.param(Algorithm.JACOBI, False, marks=pytest.mark.slow),
         pytest.param(Algorithm.JACOBI, True, marks=pytest.mark.slow),
     ],
 )
@@ -208,7 +201,7 @@ def test_a_picture_lies_in_the_camera_s_memory_alone(
     assert of_viewer < PHOTO / 2
 
 
-@pytest.mark.parametrize("isolated", ["camera", "viewer"])
+@pytest.mark.parametrize("isolated", ["camera", pytest.param("viewer", marks=pytest.mark.slow)])
 def test_one_of_them_may_be_in_this_process(fmu: FmuOf, together: Callable[[Algorithm], list[object]], isolated: str):
     options = MasterOptions(isolated=(isolated,))
     assert seen(fmu, options)[0] == together(options.algorithm)
@@ -252,10 +245,8 @@ def isolated(fmu: Path) -> Master:
 
 
 @pytest.mark.skipif(not interpreter.library(), reason="this Python has no shared library")
-@pytest.mark.parametrize("path", ["as it is", "of another Python"])
-def test_it_runs_with_this_python(doubling: Path, path: str, monkeypatch: pytest.MonkeyPatch):
-    if path == "of another Python":  # as where the virtual environment is not activated
-        monkeypatch.setenv("PATH", "/usr/bin:/bin")
+def test_it_runs_with_this_python(doubling: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("PATH", "/usr/bin:/bin")  # as where the virtual environment is not activated
     rows: list[tuple[float, float]] = []
 
     def observe(t: float, signals: Signals) -> None:
@@ -268,6 +259,7 @@ def test_it_runs_with_this_python(doubling: Path, path: str, monkeypatch: pytest
 
 def test_where_this_python_has_no_library_cause_and_cure_are_told(doubling: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(unit_process, "_libpython", lambda: "")
-    with pytest.raises(InvalidFmu, match=r"it uses Python \(_?Py\w+\), but names no library of Python") as told:
+    with pytest.raises(InvalidFmu) as told:
         isolated(doubling).__enter__()
+    assert "but names no library of Python that it needs" in str(told.value)
     assert "Cure: run it without isolation, or install Debian's libpython3" in str(told.value)

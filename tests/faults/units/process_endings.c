@@ -4,6 +4,7 @@
 #include <signal.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "frame/unit.h"
 
@@ -31,8 +32,8 @@ static void aborts(Unit *unit) {
 }
 static void hangs(Unit *unit) {
     say(unit, WARNING, "about to wait for ever");
-    for (volatile int forever = 1; forever;)
-        ;
+    for (;;)
+        sleep(1);
 }
 /* What lies behind a block of the heap is written over, which is noticed when the heap is used next. */
 static void overruns(Unit *unit) {

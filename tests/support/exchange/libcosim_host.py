@@ -57,7 +57,7 @@ def loaded(job: Any) -> CosimExecution:
 
 
 def assembled(job: Any) -> CosimExecution:
-    """Return a system of a job's units, started and connected as it says."""
+    """Return a system of a job's units, started as it says."""
     execution = CosimExecution.from_step_size(job["step"])
     slaves = [CosimLocalSlave(unit["fmu"], unit["name"]) for unit in job["units"]]
     for slave in slaves:
@@ -68,8 +68,6 @@ def assembled(job: Any) -> CosimExecution:
         for kind, values in unit["initial"].items():
             for reference, value in values:
                 check(getattr(execution, f"{kind}_initial_value")(i, reference, value))
-    for kind, *ends in job["connections"]:
-        check(getattr(execution, f"connect_{kind}_variables")(*ends) == 0)
     return execution
 
 

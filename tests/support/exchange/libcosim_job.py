@@ -16,8 +16,7 @@ import pytest
 
 from handover.cosim.blocks.variable import indices_of
 from handover.cosim.fmu.file.description import FmuDescription, FmuPort, describe_fmu
-from support.exchange.own_master import Connections, Placed
-from support.exchange.reference import Record
+from support.exchange.own_master import Placed
 from support.processes import program, with_path
 
 LIMIT = 120.0
@@ -45,7 +44,7 @@ needs_libcosim = pytest.mark.skipif(bool(_missing()), reason=_missing())
 
 @dataclass
 class Job:
-    """Units by name, how they are connected, how far to go, and by unit the values that are set before each step.
+    """Units by name, how far to go, and by unit the values that are set before each step.
 
     With an SSP, which has the units inside, start values and connections are those in it, and without a step that too.
     """
@@ -53,7 +52,6 @@ class Job:
     units: Mapping[str, Placed]
     step: Fraction | None
     steps: int
-    connections: Connections = ()
     driven: Mapping[str, Sequence[Mapping[str, Any]]] = field(default_factory=dict[str, Any])
     ssp: Path | None = None
 
@@ -90,19 +88,11 @@ class Job:
         return describe_fmu(self.units[unit].fmu)
 
     def _as_json(self) -> dict[str, Any]:
-        numbers = {name: i for i, name in enumerate(self.units)}
-        connections: list[Any] = []
-        for source, target in self.connections:
-            (a, y), (b, u) = source.split("."), target.split(".")
-            output, input_ = self.description(a).outputs[y], self.description(b).inputs[u]
-            for r, s in zip(output.references, input_.references, strict=True):
-                connections.append((KINDS[output.fmi_type], numbers[a], r, numbers[b], s))
         return {
             "step": None if self.step is None else round(self.step * 10**9),
             "steps": self.steps,
             "ssp": str(self.ssp) if self.ssp else "",
             "units": [self._unit(name, placed) for name, placed in self.units.items()],
-            "connections": connections,
         }
 
     def _unit(self, name: str, placed: Placed) -> dict[str, Any]:
@@ -120,12 +110,6 @@ class Job:
 def known(ports: Mapping[str, FmuPort]) -> list[FmuPort]:
     """Return the ports of types that libcosim knows."""
     return [port for port in ports.values() if port.fmi_type in KINDS]
-
-
-def without_enumerations(record: Record, d: FmuDescription) -> Record:
-    """Return a unit's record with only the outputs that libcosim knows."""
-    left_out = {name for name, port in d.outputs.items() if port not in known(d.outputs)}
-    return Record([{n: x for n, x in row.items() if n not in left_out} for row in record.rows], [])
 
 
 def _row(ports: Sequence[FmuPort], by_kind: Mapping[str, Sequence[Any]]) -> Row:

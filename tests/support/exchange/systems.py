@@ -32,22 +32,6 @@ def free_flyer(fmi: int, *, scalar: bool = False) -> Wired:
     return Wired(units, [*true, *measured, *commands, *thrust], Fraction(2, 125))
 
 
-def vsl(fmi: int, *, scalar: bool = False) -> Wired:
-    """Return a planner, the learned kinematics and the arm, in a closed loop.
-
-    The arm comes first: hosts that pass values on only once while they initialise then do so in the right order.
-    """
-    units = {
-        "arm": Placed(cached("VslArm", fmi, scalar=scalar), {"seed": 5}),
-        "planner": Placed(cached("TrajectoryPlanner", fmi, scalar=scalar), {"settle": 0.04}),
-        "kinematics": Placed(cached("HybridKinematics", fmi, scalar=scalar)),
-    }
-    planned = [(f"planner.{n}_ref", f"kinematics.{n}_ref") for n in ("q", "qd")]
-    commands = [(f"kinematics.{n}_cmd", f"arm.{n}_cmd") for n in ("q", "qd")]
-    measured = [(f"arm.{n}_meas", f"kinematics.{n}_meas") for n in ("q", "p", "i")]
-    return Wired(units, [*planned, ("planner.p_cmd", "arm.p_cmd"), *commands, *measured], Fraction(1, 50))
-
-
 def grasp(fmi: int, *, scalar: bool = False) -> Wired:
     """Return a soft hand before an object and its reflexes, in a closed loop without any other input."""
     units = {
