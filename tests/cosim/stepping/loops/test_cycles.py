@@ -7,13 +7,13 @@ from fractions import Fraction
 import pytest
 from support.cosim.native_units import native_fmu
 from support.cosim.oscillator import equal_masses
+from support.wording import Wording
 
 from handover.cosim.exceptions import ScheduleError
 from handover.cosim.fmu.instance import Instance
 from handover.cosim.master.master import Master
 from handover.cosim.stepping.iteration import NotConverged
 from handover.cosim.stepping.options import Algorithm, MasterOptions
-from handover.cosim.system.signals import Observer
 from handover.cosim.system.system import System
 
 both = pytest.mark.parametrize("algorithm", [Algorithm.FIXED_POINT, Algorithm.NEWTON])
@@ -58,15 +58,15 @@ def test_units_off_the_cycle_step_once(steps: Counter[str]):
     assert [len(master.cpu[name]) for name in ("a", "b", "ramp")] == [5, 5, 5]
 
 
-@both
-def test_units_that_save_no_state_are_refused_where_they_lie_in_a_circle(algorithm: Algorithm):
+def test_units_that_save_no_state_are_refused_where_they_lie_in_a_cycle(wording: Wording):
+    options = MasterOptions(algorithm=Algorithm.NEWTON)
     with pytest.raises(ScheduleError) as caught:
-        Master(equal_masses(k_c=1.0).two_units(PERIOD, canGetAndSetFMUState=False), MasterOptions(algorithm=algorithm))
-    assert "a, b (connected in a cycle: a, b)" in str(caught.value)
+        Master(equal_masses(k_c=1.0).two_units(PERIOD, canGetAndSetFMUState=False), options)
+    wording.check(caught.value)
     s = System()
     first, second = (s.add(n, native_fmu("gain", canGetAndSetFMUState=False)) for n in ("first", "second"))
     s.connect(first.y.y, second.u.u)
-    with Master(s, MasterOptions(algorithm=algorithm)) as master:
+    with Master(s, options) as master:
         master.run(Fraction(1))
         assert not master.iterates
         assert str(master.iterations) == "no step was iterated"
@@ -83,7 +83,6 @@ def test_what_does_not_converge_is_reported_with_signals_time_and_iterations(alg
     assert e.iterations == 2
     assert [name for name, _ in e.moving] == ["b.f -> a.f"]
     assert "a, b: iterating at t = 0 s found no solution in 2 iterations" in str(e)
-    assert "b.f -> a.f still moves by" in str(e)
     assert json.loads(json.dumps(e.as_data()))["moving"].keys() == {"b.f -> a.f"}
 
 
@@ -110,26 +109,3 @@ def test_a_cycle_may_hold_signals_that_are_not_real(algorithm: Algorithm):
         master.run(Fraction(1, 2))
         assert int(master.signals["b.count"]) == 3
         assert master.iterations.steps == 0
-
-
-@both
-def test_a_run_goes_on_from_saved_states_to_the_same_bits(algorithm: Algorithm):
-    def record(seen: list[float]) -> Observer:
-        return lambda _t, y: seen.append(float(y["a.x"]))
-
-    whole: list[float] = []
-    rest: list[float] = []
-    options = MasterOptions(algorithm=algorithm)
-    with Master(equal_masses(k_c=100.0).two_units(PERIOD), options) as master:
-        master.run(Fraction(1), [record(whole)])
-        state = json.loads(json.dumps(master.stepper.get_state()))
-        saved = master.ensemble.save(["a", "b"])
-        master.run(Fraction(2), [record(whole)])
-        count = str(master.iterations)
-        master.ensemble.restore(saved)
-        master.stepper.set_state(state)
-        master.run(Fraction(2), [record(rest)])
-        assert str(master.iterations) == count
-        master.ensemble.forget(saved)
-    assert rest == whole[-len(rest) :]
-    assert len(rest) == 11
