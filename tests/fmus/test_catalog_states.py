@@ -18,7 +18,7 @@ LIMIT = 120.0
 IN_BOTH = ("FreeFlyer", "HandoverStateMachine")
 """Units whose FMI 2 form is tried too; what differs between the forms is not the unit's."""
 
-OF_EACH_KIND = ("FreeFlyer", "GraspScene", "HandAndObject", "Push", "TendonArmFast", "VslArm")
+OF_EACH_KIND = ("HandAndObject", "Push", "VslArm")
 """Units in the fast tier."""
 
 FORMS = [(n, 2) for n in IN_BOTH] + [

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support.sample_units import every_kind, eye
+from support.wording import Wording
 
 from handover.cosim.blocks.description import describe
 from handover.fmus.buffers import Buffers
@@ -24,51 +25,36 @@ def every_kind_with(**changed: Any) -> Buffers:
     return write(every_kind.EveryKind, block.outputs(0.0, every_kind.Inputs()), **changed)
 
 
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [
-        ("b", None),
-        ("b", "1.0"),
-        ("b", np.zeros(2)),
-        ("p", np.array(["1", "2", "3"])),
-        ("p", np.ones(3) * 1j),
-        ("p", [True, False, True]),
-        ("p", [None, 1.0, 2.0]),
-        ("total", 1.0),
-        ("total", True),
-        ("total", 1 << 63),
-        ("off", "False"),
-        ("off", 1),
-        ("off", None),
-        ("mood_out", 3),
-        ("mood_out", True),
-        ("mood_out", 1.0),
-        ("sentence", None),
-        ("sentence", b"words"),
-        ("sentence", "\ud800"),
-    ],
-)
-def test_an_output_of_another_type_is_refused(name: str, value: Any):
-    with pytest.raises(InvalidOutput, match=f"output '{name}' is declared as"):
-        every_kind_with(**{name: value})
+REFUSED: dict[str, list[Any]] = {
+    "b": [None, "1.0", np.zeros(2)],
+    "p": [np.array(["1", "2", "3"]), np.ones(3) * 1j, [True, False, True], [None, 1.0, 2.0]],
+    "total": [1.0, True, 1 << 63],
+    "off": ["False", 1, None],
+    "mood_out": [3, True, 1.0],
+    "sentence": [None, b"words", "\ud800"],
+}
 
 
-@pytest.mark.parametrize("value", ["text", bytearray(b"x"), None, bytes(1 << 17)])
-def test_bytes_of_another_type_or_without_room_are_refused(value: Any):
+def test_an_output_of_another_type_is_refused(wording: Wording):
+    for name, values in REFUSED.items():
+        for value in values:
+            with pytest.raises(InvalidOutput) as refused:
+                every_kind_with(**{name: value})
+            wording.check(refused.value)
+
+
+def test_bytes_of_another_type_or_without_room_are_refused():
     y = eye.Outputs(brighter=np.zeros((720, 1280, 3), np.uint8), note_back=b"")
-    with pytest.raises(InvalidOutput, match="output 'note_back' is declared as binary"):
-        write(eye.Eye, y, note_back=value)
+    for value in ("text", bytearray(b"x"), None, bytes(1 << 17)):
+        with pytest.raises(InvalidOutput, match="note_back"):
+            write(eye.Eye, y, note_back=value)
 
 
-@pytest.mark.parametrize("y", [None, {"b": 1.0}, 1.0])
-def test_what_are_no_outputs_is_refused_with_what_would_be(y: Any):
-    with pytest.raises(OtherReturn, match=r"Outputs\(.*b=\.\.\."):
-        output_writer(Buffers(Layout(describe(every_kind.EveryKind))))(y)
-
-
-def test_the_items_of_an_enumeration_are_named():
-    with pytest.raises(InvalidOutput, match="one of 0 CALM, 1 KEEN, 5 WILD; the block gave int: 3"):
-        every_kind_with(mood_out=3)
+def test_what_are_no_outputs_is_refused_with_what_would_be(wording: Wording):
+    for y in (None, {"b": 1.0}, 1.0):
+        with pytest.raises(OtherReturn) as refused:
+            output_writer(Buffers(Layout(describe(every_kind.EveryKind))))(y)
+        wording.check(refused.value)
 
 
 def test_numpys_scalars_and_lists_of_numbers_are_taken():

@@ -6,7 +6,6 @@ from importlib import metadata
 from pathlib import Path
 
 import pytest
-from support.fmus.ctypes_host import CtypesHost
 from support.fmus.workshop import Workshop
 
 from handover.fmus.catalog import PackageFailure, UnknownBlock, import_class
@@ -37,22 +36,21 @@ def of_all_installed_asked_once(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(metadata, "packages_distributions", _installed)
 
 
-@pytest.fixture(params=FAILURES)
-def package(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> "tuple[str, str]":
-    """Return the name of an installed package whose import fails, and what is to be told."""
-    code, told = FAILURES[request.param]
-    name = f"package_with_{request.param}"
-    (tmp_path / "site-packages" / name).mkdir(parents=True)
-    (tmp_path / "site-packages" / name / "__init__.py").write_text(code)
+def broken_package(folder: Path, monkeypatch: pytest.MonkeyPatch, code: str, name: str) -> str:
+    """Install a package whose import fails; return its name."""
+    (folder / "site-packages" / name).mkdir(parents=True)
+    (folder / "site-packages" / name / "__init__.py").write_text(code)
+    monkeypatch.syspath_prepend(str(folder / "site-packages"))
+    return name
+
+
+@pytest.mark.parametrize("case", FAILURES)
+def test_the_builder_tells_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, case: str):
+    code, told = FAILURES[case]
+    name = broken_package(tmp_path, monkeypatch, code, f"package_with_{case}")
     (tmp_path / "own_blocks.py").write_text(f"import {name}\n")
-    monkeypatch.syspath_prepend(str(tmp_path / "site-packages"))
     monkeypatch.syspath_prepend(str(tmp_path))
     monkeypatch.delitem(sys.modules, "own_blocks", raising=False)
-    return name, told
-
-
-def test_the_builder_tells_it(package: "tuple[str, str]"):
-    name, told = package
     with pytest.raises(PackageFailure) as failure:
         import_class("own_blocks:Block")
     text = str(failure.value)
@@ -63,21 +61,16 @@ def test_the_builder_tells_it(package: "tuple[str, str]"):
     assert text.count("Cure: ") == 1
 
 
-@pytest.fixture
-def host(workshop: Workshop) -> CtypesHost:
-    """Return an instance's host, whose FMU is made before `package` changes the folders that it notes."""
-    return workshop.own("scalars:Scalars", 3)
-
-
-def test_an_fmu_tells_it(host: CtypesHost, package: "tuple[str, str]"):
-    name, told = package
+def test_an_fmu_tells_it(workshop: Workshop, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    host = workshop.own("scalars:Scalars", 3)
+    code, told = FAILURES["missing_library"]
+    name = broken_package(tmp_path, monkeypatch, code, "package_in_an_fmu")
     unit = host.folder / "resources" / "unit.json"
     unit.write_text(unit.read_text().replace("_fmu_", f"_fmu_{name}_"))
     (host.folder / "resources" / "sources" / "support" / "sample_units" / "scalars.py").write_text(f"import {name}\n")
     assert not host.instantiate()
-    assert "unit Scalars cannot be loaded: " in host.log[-1]
-    assert name in host.log[-1]
-    assert told in host.log[-1]
+    for part in ("unit Scalars cannot be loaded: ", name, told):
+        assert part in host.log[-1]
     assert "Traceback" not in host.log[-1]
 
 
@@ -89,34 +82,24 @@ def test_a_module_that_a_block_itself_lacks_is_named_with_the_extra_that_brings_
         import_class("handover.plants.ir_grasp.pymunk_edge:Space")
 
 
-def test_an_error_of_the_blocks_own_module_is_told_as_such(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    (tmp_path / "own_fault.py").write_text("1 / 0\n")
-    monkeypatch.syspath_prepend(str(tmp_path))
-    with pytest.raises(UnknownBlock, match=r"cannot be loaded \(own_fault\.py, line 1\): ZeroDivisionError") as failure:
-        import_class("own_fault:Block")
-    assert not isinstance(failure.value, PackageFailure)
-
-
-def test_a_name_that_no_module_has_is_told_with_its_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    (tmp_path / "own_name.py").write_text("\nfrom math import no_such_name\n")
-    monkeypatch.syspath_prepend(str(tmp_path))
-    with pytest.raises(PackageFailure, match=r"own_name\.py, line 2"):
-        import_class("own_name:Block")
-
-
 @pytest.mark.parametrize(
-    ("library", "package"),
+    ("code", "error", "told"),
     [
-        ("libGL.so.1", "libgl1"),
-        ("libX11.so.6", "libx11-6"),
-        ("libatomic.so.1", "libatomic1"),
-        ("libstdc++.so.6", "libstdc++6"),
-        ("libgcc_s.so.1", "libgcc-s1"),
+        ("1 / 0\n", UnknownBlock, r"cannot be loaded \(own_fault\.py, line 1\): ZeroDivisionError"),
+        ("\nfrom math import no_such_name\n", PackageFailure, r"own_fault\.py, line 2"),
     ],
 )
-def test_packages_are_named_by_debians_rule(library: str, package: str):
-    assert debian_package(library) == package
+def test_an_error_of_the_blocks_own_module_is_told_with_its_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: str, error: type[Exception], told: str
+):
+    (tmp_path / "own_fault.py").write_text(code)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    with pytest.raises(error, match=told) as failure:
+        import_class("own_fault:Block")
+    assert type(failure.value) is error
 
 
-def test_an_empty_message_is_told_by_its_type():
+def test_packages_are_named_by_debians_rule():
+    libraries = ("libGL.so.1", "libX11.so.6", "libatomic.so.1", "libstdc++.so.6", "libgcc_s.so.1")
+    assert [*map(debian_package, libraries)] == ["libgl1", "libx11-6", "libatomic1", "libstdc++6", "libgcc-s1"]
     assert explain_import(ImportError()).startswith("importing a module fails: ImportError")

@@ -3,7 +3,6 @@
 import csv
 import io
 import itertools
-import re
 import xml.etree.ElementTree as ET
 import zipfile
 from fractions import Fraction
@@ -19,7 +18,7 @@ from handover.cosim.check.check_fmu import check_fmu
 from handover.cosim.experiments.manifest import FOLDER, MANIFEST, related_files
 from handover.cosim.experiments.reference_experiment import Setup, experiments_in
 from handover.cosim.experiments.signal_table import InvalidTable
-from handover.cosim.fmu.file.archive import FmuArchive, write_archive
+from handover.cosim.fmu.file.archive import FmuArchive
 from handover.fmus.build import ExperimentRequest, build
 from handover.fmus.catalog import Entry
 from handover.fmus.contents.related_files import (
@@ -93,17 +92,8 @@ def test_an_experiment_is_stored_with_its_result(tmp_path: Path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("fmi", "scalar"), [(2, False), (3, True)])
-def test_an_experiment_is_repeated_in_each_form(tmp_path: Path, fmi: int, scalar: bool):
-    fmu = build(
-        EVERY_KIND,
-        fmi,
-        tmp_path,
-        scalar=scalar,
-        platforms=["host"],
-        parameter_sets=SETS,
-        experiment=ExperimentRequest(),
-    )
+def test_an_experiment_is_repeated_in_another_form(tmp_path: Path):
+    fmu = build(EVERY_KIND, 2, tmp_path, platforms=["host"], parameter_sets=SETS, experiment=ExperimentRequest())
     schema().validate(io.BytesIO(contents(fmu)[MANIFEST]))
     report = check_fmu(fmu, 60.0)
     assert report.passed
@@ -129,67 +119,31 @@ def test_a_stimulus_of_ones_own_is_played(tmp_path: Path):
     assert gained == pytest.approx([0.1] * 3 + [1.0] * 3, abs=1e-12)  # a tick takes the input of its instant
 
 
-@pytest.mark.parametrize(
-    ("block", "content"),
-    [
-        pytest.param(CHAOTIC, "time,w\n0,1\n1,1\n", id="no input"),
-        pytest.param(CHAOTIC, "time,x\n0,nan\n1,1\n", id="NaN"),
-        pytest.param(CHAOTIC, "time,x\n0,0.1\n0,0.1\n", id="no time between"),
-        pytest.param(CHAOTIC, "time,x\n0,2.0\n1,0.1\n", id="out of range"),
-        pytest.param(CHAOTIC, "time,x\n0,0.1\n", id="one row"),
-        pytest.param(SAMPLED, "time,u\n0.0,1.0\n0.25,1.0\n", id="within a step"),
-    ],
-)
-def test_a_stimulus_at_fault_is_refused_before_anything_is_written(
-    tmp_path: Path, block: Entry, content: str, wording: Wording
-):
+def test_a_stimulus_at_fault_is_refused_before_anything_is_written(tmp_path: Path, wording: Wording):
     given = tmp_path / "given.csv"
-    given.write_text(content)
-    with pytest.raises(InvalidTable) as caught:
-        build(block, 3, tmp_path / "out", platforms=["host"], experiment=ExperimentRequest(given))
-    wording.check(caught.value)
-    assert not (tmp_path / "out").exists()
+    for block, content in (
+        (CHAOTIC, "time,w\n0,1\n1,1\n"),
+        (CHAOTIC, "time,x\n0,nan\n1,1\n"),
+        (CHAOTIC, "time,x\n0,0.1\n0,0.1\n"),
+        (CHAOTIC, "time,x\n0,2.0\n1,0.1\n"),
+        (CHAOTIC, "time,x\n0,0.1\n"),
+        (SAMPLED, "time,u\n0.0,1.0\n0.25,1.0\n"),  # ends within a step
+    ):
+        given.write_text(content)
+        with pytest.raises(InvalidTable) as caught:
+            build(block, 3, tmp_path / "out", platforms=["host"], experiment=ExperimentRequest(given))
+        wording.check(caught.value)
+        assert not (tmp_path / "out").exists()
 
 
-def test_a_unit_of_pictures_has_nothing_to_compare(tmp_path: Path, wording: Wording):
-    with pytest.raises(NothingToCompare) as caught:
+def test_a_unit_of_pictures_or_that_fails_is_not_proven(tmp_path: Path, wording: Wording):
+    with pytest.raises(NothingToCompare) as nothing:
         build(EYE, 3, tmp_path / "out", platforms=["host"], experiment=ExperimentRequest())
-    wording.check(caught.value)
-
-
-def test_a_unit_that_fails_is_not_proven(tmp_path: Path):
+    wording.check(nothing.value)
     given = tmp_path / "given.csv"
     given.write_text("time,a\n0.0,1.0\n0.1,666\n0.3,1\n")
     with pytest.raises(CannotRecordExperiment, match=r"fmi3DoStep at t = 0\.1 s .*the number of the beast"):
         build(EVERY_KIND, 3, tmp_path / "out", platforms=["host"], experiment=ExperimentRequest(given))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("places", "passes"), [(1, True), (2, False)])
-def test_the_last_place_of_a_single_precision_output_may_be_another(tmp_path: Path, places: int, passes: bool):
-    given = tmp_path / "given.csv"
-    given.write_text("time,x\n0.0,0.5\n0.1,0.5\n")
-    single = unit("chaotic:ChaoticSingle")
-    files = contents(build(single, 3, tmp_path, platforms=["host"], experiment=ExperimentRequest(given)))
-    result = f"{FOLDER}/smoke-test/result.csv"
-    assert files[result].startswith(b"time,y\n0.0,0.5\n")
-    files[result] = files[result].replace(b"0.0,0.5", f"0.0,{0.5 + places * 2.0**-24!r}".encode())
-    files[MANIFEST] = re.sub(rb'relative="[^"]*"', b'relative="1e-9"', files[MANIFEST])
-    report = check_fmu(write_archive(tmp_path / "other.fmu", files), 60.0)
-    assert report.passed is passes
-    (line,) = [f.line for f in report.sections[-1].findings] or [""]
-    assert ("(1.19209e-07 of its largest value 0.5, and 1e-12)" in line) is (places > 0)
-
-
-@pytest.mark.slow
-def test_a_result_of_other_parameters_is_reported(tmp_path: Path):
-    fmu = build(SAMPLED, 3, tmp_path, platforms=["host"], experiment=ExperimentRequest())
-    files = contents(fmu)
-    files["modelDescription.xml"] = files["modelDescription.xml"].replace(b'start="0.1"', b'start="0.2"')
-    report = check_fmu(write_archive(tmp_path / "other.fmu", files), 60.0)
-    assert not report.passed
-    (finding,) = report.sections[-1].findings
-    assert "made with other parameters: gain was '0.1' and is '0.2'" in finding.line
 
 
 @pytest.mark.parametrize(("fmi", "scalar"), FORMS)
@@ -207,22 +161,17 @@ def test_a_parameter_set_has_the_variables_of_its_form(tmp_path: Path, fmi: int,
     assert root[0][0].get("description") == "table 1 (stated)"
 
 
-@pytest.mark.parametrize(
-    ("names", "values"),
-    [
-        pytest.param(["../a"], {"gain": 3.0}, id="a path"),
-        pytest.param(["a b"], {"gain": 3.0}, id="a space"),
-        pytest.param([""], {"gain": 3.0}, id="no name"),
-        pytest.param(["a", "A"], {"gain": 3.0}, id="one name twice"),
-        pytest.param(["a"], {"gains": 1.0}, id="no parameter"),
-        pytest.param(["a"], {"gain": 11.0}, id="out of range"),
-    ],
-)
-def test_a_parameter_set_that_is_no_files_or_does_not_fit_is_refused(
-    tmp_path: Path, names: list[str], values: dict[str, Any], wording: Wording
-):
-    sets = [ParameterSet(name=name, description="b", values=values) for name in names]
-    with pytest.raises(InvalidParameterSet) as caught:
-        build(EVERY_KIND, 3, tmp_path / "out", parameter_sets=sets)
-    wording.check(caught.value)
-    assert not (tmp_path / "out").exists()
+def test_a_parameter_set_that_is_no_files_or_does_not_fit_is_refused(tmp_path: Path, wording: Wording):
+    for names, values in (
+        (["../a"], {"gain": 3.0}),
+        (["a b"], {"gain": 3.0}),
+        ([""], {"gain": 3.0}),
+        (["a", "A"], {"gain": 3.0}),
+        (["a"], {"gains": 1.0}),
+        (["a"], {"gain": 11.0}),
+    ):
+        sets = [ParameterSet(name=name, description="b", values=values) for name in names]
+        with pytest.raises(InvalidParameterSet) as caught:
+            build(EVERY_KIND, 3, tmp_path / "out", parameter_sets=sets)
+        wording.check(caught.value)
+        assert not (tmp_path / "out").exists()

@@ -3,12 +3,11 @@
 import ctypes
 import os
 import signal
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 from support.fmus.ctypes_host import ERROR, OK, CtypesHost
+from support.fmus.forking_host import expect_end_with_host
 from support.fmus.saved_states import called, deserialise, save, serialised
 from support.fmus.workshop import Workshop
 from support.sample_units.trouble import Deed
@@ -198,29 +197,6 @@ def test_nothing_is_left_behind(workshop: Workshop, tmp_path: Path, monkeypatch:
     assert list(tmp_path.iterdir()) == []
 
 
-HOST = """
-import os, signal, sys
-sys.path[:0] = {path!r}
-from pathlib import Path
-from support.fmus.ctypes_host import CtypesHost
-host = CtypesHost(Path({fmu!r}), 3)
-assert host.instantiate() and host.initialise() == 0 and host.step(0.0, 1 / 64) == 0
-assert int(host.get("process")[0]) != os.getpid()
-print("ready", flush=True)
-if {hangs}:
-    signal.setitimer(signal.ITIMER_REAL, 0.1)  # whose signal ends this process
-    host.put("Integer", "deed", {deed})
-    host.step(1 / 64, 1 / 64)
-signal.pause()
-"""
-
-
-@pytest.mark.parametrize("hangs", [False, pytest.param(True, marks=pytest.mark.slow)])
-def test_the_process_ends_with_the_host(workshop: Workshop, hangs: bool):
-    script = HOST.format(path=sys.path, fmu=str(workshop.fmu(TROUBLE, 3)), hangs=hangs, deed=int(Deed.HANG))
-    with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True) as host:
-        assert host.stdout
-        assert host.stdout.readline() == "ready\n"
-        if not hangs:
-            host.kill()
-        assert host.communicate(timeout=60)[0] == ""  # ends when the unit's process does, which has the pipe, too
+@pytest.mark.parametrize("deed", [Deed.NONE, pytest.param(Deed.HANG, marks=pytest.mark.slow)])
+def test_the_process_ends_with_the_host(workshop: Workshop, deed: Deed):
+    expect_end_with_host(workshop.fmu(TROUBLE, 3), deed)

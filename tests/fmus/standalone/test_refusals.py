@@ -8,6 +8,7 @@ from typing import Any
 import fmpy
 import pytest
 from click.testing import CliRunner
+from support.fmus.written_blocks import write_block
 
 from handover.fmus.build import build
 from handover.fmus.catalog import own_unit
@@ -17,53 +18,6 @@ from handover.fmus.standalone import freezer
 from handover.fmus.standalone.freezer import CannotFreeze
 from handover.scenarios.cli.units import build as build_units
 from handover.scenarios.cli.units.build import build_command
-
-READER = '''"""A gain out of a table."""
-import csv
-from dataclasses import dataclass
-from pathlib import Path
-
-from handover.cosim.blocks.ports import output, port
-from handover.cosim.blocks.units import Number
-
-
-@dataclass(frozen=True, kw_only=True)
-class Params:
-    pass
-
-
-@dataclass(kw_only=True)
-class Inputs:
-    u: Number = port(1.0, "what is scaled")
-
-
-@dataclass(kw_only=True)
-class Outputs:
-    y: Number = output("scaled")
-
-
-class Reader:
-    """Scales its input by a number in a file."""
-
-    feedthrough = {"y": ("u",)}
-    period = None
-
-    def __init__(self, params: Params) -> None:
-        with PLACE.open() as file:
-            self._gain = float(next(csv.reader(file))[0])
-
-    def outputs(self, t: float, u: Inputs) -> Outputs:
-        return Outputs(y=self._gain * u.u)
-
-    def step(self, t: float, dt: float, u: Inputs) -> Outputs:
-        return self.outputs(t, u)
-
-    def get_state(self) -> bytes:
-        return b""
-
-    def set_state(self, state: bytes) -> None:
-        pass
-'''
 
 
 @pytest.fixture
@@ -78,9 +32,11 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def reader(folder: Path, name: str, place: str) -> str:
-    """Write a module whose block reads a file at a place, an expression; return the block's path."""
-    (folder / f"{name}.py").write_text(READER.replace("PLACE", place))
-    return f"{name}:Reader"
+    """Write a block that reads a file at a place, an expression; return the block's path."""
+    return write_block(folder, name, f"float(__import__('pathlib').{place}.read_text())", f"{name}_helper")
+
+
+BESIDE = "Path(__file__).with_name('table.csv')"
 
 
 def refused(*given: str) -> str:
@@ -127,33 +83,29 @@ def test_without_pyinstaller(monkeypatch: pytest.MonkeyPatch):
     assert cure in refused("Push", "--standalone", "--fmi", "3", "--platform", "host")
 
 
-def test_a_file_elsewhere_or_of_a_unit_of_the_catalog(folder: Path, tmp_path: Path):
-    block = reader(folder, "reads_elsewhere", "Path(__file__).with_name('table.csv')")
+def test_a_file_beside_the_module_goes_along_and_others_are_refused(folder: Path, tmp_path: Path):
+    block = reader(folder, "reads_beside", BESIDE)
     elsewhere = tmp_path / "elsewhere.csv"
     elsewhere.write_text("1\n")
     for file in (elsewhere, folder / "nothing.csv"):
         with pytest.raises(FileElsewhere, match="the folder of the block's module"):
             build(own_unit(block, None), 3, tmp_path, include=[file])
-    assert "--include is for units of your own" in refused("Push", "--include", "table.csv")
-
-
-@pytest.mark.usefixtures("compiles_nothing")
-def test_a_file_elsewhere_is_refused_before_anything_is_compiled(folder: Path):
-    block = reader(folder, "reads_nothing_else", "Path(__file__).with_name('table.csv')")
-    assert "--include: nothing.csv does not lie in" in refused(block, "--include", "nothing.csv", "--platform", "host")
-
-
-def test_a_file_beside_the_module_goes_along(folder: Path, tmp_path: Path):
-    block = reader(folder, "reads_beside", "Path(__file__).with_name('table.csv')")
     fmu = build(own_unit(block, None), 3, tmp_path, include=[folder / "table.csv"])
     (folder / "table.csv").write_text("no number\n")
     result: Any = fmpy.simulate_fmu(str(fmu), stop_time=0.1, output=["y"])  # type: ignore
     assert result["y"][-1] == 2.5
 
 
+@pytest.mark.usefixtures("compiles_nothing")
+def test_a_file_elsewhere_is_refused_before_anything_is_compiled(folder: Path):
+    block = reader(folder, "reads_nothing_else", BESIDE)
+    assert "--include: nothing.csv does not lie in" in refused(block, "--include", "nothing.csv", "--platform", "host")
+    assert "--include is for units of your own" in refused("Push", "--include", "table.csv")
+
+
 @pytest.mark.slow
 def test_files_that_the_fmu_lacks_or_that_only_this_machine_has(folder: Path, tmp_path: Path):
-    beside = own_unit(reader(folder, "reads_missing", "Path(__file__).with_name('table.csv')"), None)
+    beside = own_unit(reader(folder, "reads_missing", BESIDE), None)
     with pytest.raises(
         CannotFreeze,
         match=r"opens table\.csv, which the FMU does not have there; open it beside the",
@@ -169,9 +121,9 @@ def test_files_that_the_fmu_lacks_or_that_only_this_machine_has(folder: Path, tm
 @pytest.mark.slow
 def test_a_package_that_is_not_frozen_is_named(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("HANDOVER_CACHE", str(tmp_path / "cache"))
-    block = own_unit(reader(folder, "reads_nothing", "Path(__file__)"), None)
+    block = own_unit(write_block(folder, "reads_nothing", "1.0", "nothing_helper"), None)
     unwanted = freezer._unwanted  # type: ignore
     monkeypatch.setattr(freezer, "_unwanted", lambda names: [*unwanted(names), "typing_extensions"])  # type: ignore
-    with pytest.raises(CannotFreeze, match="Reader: package typing_extensions cannot be frozen: PyInstaller"):
+    with pytest.raises(CannotFreeze, match="Small: package typing_extensions cannot be frozen: PyInstaller"):
         build(block, 3, tmp_path / "out", standalone=True)
     assert not list(tmp_path.glob("out/*.fmu"))

@@ -1,20 +1,18 @@
 """Instances of a unit that brings its interpreter: one process for all, and what becomes of them if it fails."""
 
-import ctypes
 import json
 import os
-import signal
-import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from support.fmus.ctypes_host import ERROR, OK, SIZE, CtypesHost
-from support.processes import program, with_path
+from support.fmus.ctypes_host import ERROR, OK, CtypesHost
+from support.fmus.forking_host import expect_end_with_host
+from support.processes import lives
 from support.sample_units.trouble import Deed
 
-from handover.fmus.build import build, build_block
+from handover.fmus.build import build
 from handover.fmus.catalog import own_unit
 from handover.fmus.compile import host_platform
 
@@ -26,7 +24,7 @@ pytestmark = [
 DT = 1 / 64
 OF_THE_HOST = "/of/the/host"
 """A value of environment variables."""
-VARIABLES = (
+VARIABLES = [
     "PYTHONHOME",
     "PYTHONPATH",
     "LD_PRELOAD",
@@ -35,7 +33,7 @@ VARIABLES = (
     "LC_ALL",
     "MPLBACKEND",
     "OMP_NUM_THREADS",
-)
+]
 
 
 @pytest.fixture(scope="module")
@@ -63,19 +61,10 @@ def process(host: CtypesHost) -> int:
     return int(host.get("process")[0])
 
 
-def do(host: CtypesHost, deed: Deed) -> int:
+def asked_for(host: CtypesHost, deed: Deed) -> int:
     """Return the status of a step in which the block does something."""
-    reference = (ctypes.c_uint32 * 1)(host.references["deed"])
-    assert host.call("SetInt64", reference, SIZE(1), (ctypes.c_int64 * 1)(deed), SIZE(1)) == OK
+    host.put("Integer", "deed", deed)
     return host.step(DT, DT)
-
-
-def is_alive(number: int) -> bool:
-    try:
-        os.kill(number, 0)
-    except ProcessLookupError:
-        return False
-    return True
 
 
 def test_instances_share_a_process_that_ends_with_the_last(host: CtypesHost):
@@ -83,16 +72,16 @@ def test_instances_share_a_process_that_ends_with_the_last(host: CtypesHost):
     assert process(first) == process(second) != os.getpid()
     number = process(first)
     first.free()
-    assert is_alive(number)
+    assert lives(number)
     assert second.step(DT, DT) == OK
     assert second.get("count") == [2.0]
     second.free()
-    assert not is_alive(number)
+    assert not lives(number)
 
 
 def test_a_crash_is_told_to_every_instance_and_each_can_go_on_after_a_reset(host: CtypesHost):
     first, second = instance(host), instance(host)
-    assert do(first, Deed.CRASH) == ERROR
+    assert asked_for(first, Deed.CRASH) == ERROR
     assert "ended by signal 11 (Segmentation fault)" in first.log[-1]
     assert second.step(DT, DT) == ERROR
     assert "ended by signal 11 (Segmentation fault)" in second.log[-1]
@@ -110,9 +99,9 @@ def test_an_instance_that_hangs_is_ended_when_its_time_is_over(host: CtypesHost,
     monkeypatch.setenv("FMU_PYTHON_TIMEOUT", "0.5")
     first, second = instance(host), instance(host)
     number = process(first)
-    assert do(first, Deed.HANG) == ERROR
+    assert asked_for(first, Deed.HANG) == ERROR
     assert "did not answer for 0.5 s and was ended" in first.log[-1]
-    assert not is_alive(number)
+    assert not lives(number)
     assert second.step(DT, DT) == ERROR
     assert "was ended, as it did not answer another instance of the unit in time" in second.log[-1]
     first.free()
@@ -155,35 +144,19 @@ def test_another_unit_at_the_same_place_does_not_meet_the_process_of_the_one_bef
     host.close()
 
 
-@pytest.mark.parametrize("standalone", [True, False])
-def test_it_ends_with_a_host_of_which_a_fork_lives_on(fmu: Path, tmp_path: Path, standalone: bool):
-    unit = fmu if standalone else build_block("support.sample_units.trouble:Trouble", 3, tmp_path)
-    environment = with_path() | {"FMU_PYTHON_PROCESS": "1"}
-    command = program("fmus/forking_host.py", unit)
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as host:
-        assert host.stdout
-        fork = int(host.stdout.readline())
-        try:
-            host.kill()
-            assert host.communicate(timeout=20)[0] == ""  # ends when the unit's process does, which has the pipe, too
-            assert is_alive(fork)
-        finally:
-            os.kill(fork, signal.SIGKILL)
+def test_it_ends_with_a_host_of_which_a_fork_lives_on(fmu: Path):
+    expect_end_with_host(fmu)
 
 
-def test_on_another_platform_it_says_so(fmu: Path):
+@pytest.mark.parametrize("damaged", [False, True])
+def test_where_it_cannot_start_it_says_so_and_no_other_python_is_tried(fmu: Path, damaged: bool):
     host = CtypesHost(fmu, 3)
     bundled = host.folder / "resources" / "standalone" / host_platform()
-    bundled.rename(bundled.with_name("riscv64-linux"))
+    if damaged:
+        (bundled / "unit").write_bytes(b"\x7fELF damaged")
+    else:
+        bundled.rename(bundled.with_name("riscv64-linux"))
     assert not host.instantiate()
-    assert "brings its interpreter for another platform than this one" in host.log[-1]
-    host.close()
-
-
-def test_a_program_that_is_damaged_is_told_and_no_other_python_is_tried(fmu: Path):
-    host = CtypesHost(fmu, 3)
-    program = host.folder / "resources" / "standalone" / host_platform() / "unit"
-    program.write_bytes(b"\x7fELF damaged")
-    assert not host.instantiate()
-    assert "its own interpreter, which does not start, and no other is tried" in host.log[-1]
+    told = {False: "brings its interpreter for another platform", True: "which does not start, and no other is tried"}
+    assert told[damaged] in host.log[-1]
     host.close()

@@ -10,6 +10,7 @@ import numpy as np
 
 from handover.cosim.blocks.ports import Vector2, output, parameter, port
 from handover.cosim.blocks.units import BaseExponents, Metre, Number, Unit
+from support.sample_units.memoryless import Memoryless
 
 Kilometre = Annotated[float, Unit("km", BaseExponents(m=1), factor=1000.0)]
 Degree = Annotated[float, Unit("deg", BaseExponents(rad=1), factor=np.pi / 180)]
@@ -50,28 +51,18 @@ class Outputs:
     on: bool = output("switch")
 
 
-class Declarations:
+class Declarations(Memoryless):
     """Gives back what it was given."""
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {"data_out": ("data",), "way": ("heading", "heat")}
-    period: ClassVar[Fraction | None] = None
 
     def __init__(self, params: Params) -> None:
         self.params = params
 
-    def outputs(self, t: float, u: Inputs) -> Outputs:
+    def step(self, t: float, dt: float, u: Inputs) -> Outputs:
         p = self.params
         way = np.array([u.heading, u.heat])
-        return Outputs(way=way, x=t, gear_out=p.gear, data_out=u.data, told=p.label, on=u.count > 0)
-
-    def step(self, t: float, dt: float, u: Inputs) -> Outputs:
-        return self.outputs(t + dt, u)
-
-    def get_state(self) -> bytes:
-        return b""
-
-    def set_state(self, state: bytes) -> None:
-        pass
+        return Outputs(way=way, x=t + dt, gear_out=p.gear, data_out=u.data, told=p.label, on=u.count > 0)
 
 
 @dataclass(kw_only=True)
@@ -88,7 +79,7 @@ class OutputsWithoutData:
     told: str = output("the label")
 
 
-class WithoutData:
+class WithoutData(Memoryless):
     """The same without bytes, which FMI 2 does not know; sampled."""
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {"way": ("heading", "heat")}
@@ -97,15 +88,6 @@ class WithoutData:
     def __init__(self, params: Params) -> None:
         self.params = params
 
-    def outputs(self, t: float, u: InputsWithoutData) -> OutputsWithoutData:  # noqa: ARG002
+    def step(self, t: float, dt: float, u: InputsWithoutData) -> OutputsWithoutData:  # noqa: ARG002
         p = self.params
         return OutputsWithoutData(way=np.array([u.heading, u.heat]), gear_out=p.gear, told=p.label)
-
-    def step(self, t: float, dt: float, u: InputsWithoutData) -> OutputsWithoutData:
-        return self.outputs(t + dt, u)
-
-    def get_state(self) -> bytes:
-        return b""
-
-    def set_state(self, state: bytes) -> None:
-        pass

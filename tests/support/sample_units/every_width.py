@@ -1,9 +1,7 @@
 """A block with a port of every width of numbers."""
 
-import pickle
 from collections.abc import Mapping
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import ClassVar
 
 import numpy as np
@@ -23,6 +21,7 @@ from handover.cosim.blocks.ports import (
     port,
 )
 from handover.cosim.blocks.units import Metre, Second
+from support.sample_units.memoryless import Memoryless
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,16 +59,15 @@ class Outputs:
     told: str = output("all inputs, as the block sees them")
 
 
-class EveryWidth:
+class EveryWidth(Memoryless):
     """Gives its inputs back; the Int8 shifted, the Float32 stretched."""
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {f"{n}_out": (n,) for n in Inputs.__annotations__}
-    period: ClassVar[Fraction | None] = None
 
     def __init__(self, params: Params) -> None:
         self.params = params
 
-    def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
+    def step(self, t: float, dt: float, u: Inputs) -> Outputs:  # noqa: ARG002
         p = self.params
         return Outputs(
             x_out=u.x * p.stretch,
@@ -84,15 +82,6 @@ class EveryWidth:
             u64_out=u.u64,
             told=repr((u.x, u.v.tolist(), u.i8, u.u8, u.i16, u.u16, u.i32, u.u32, u.i64, u.u64)),
         )
-
-    def step(self, t: float, dt: float, u: Inputs) -> Outputs:
-        return self.outputs(t + dt, u)
-
-    def get_state(self) -> bytes:
-        return pickle.dumps(None)
-
-    def set_state(self, state: bytes) -> None:
-        pass
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,23 +99,11 @@ class LongOutputs:
     most_out: UInt64 = output("the parameter")
 
 
-class Long:
+class Long(Memoryless):
     """Gives its parameter back, which has more bits than FMI 2 knows."""
-
-    feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}
-    period: ClassVar[Fraction | None] = None
 
     def __init__(self, params: LongParams) -> None:
         self.params = params
 
-    def outputs(self, t: float, u: NoInputs) -> LongOutputs:  # noqa: ARG002
+    def step(self, t: float, dt: float, u: NoInputs) -> LongOutputs:  # noqa: ARG002
         return LongOutputs(most_out=self.params.most)
-
-    def step(self, t: float, dt: float, u: NoInputs) -> LongOutputs:
-        return self.outputs(t + dt, u)
-
-    def get_state(self) -> bytes:
-        return b""
-
-    def set_state(self, state: bytes) -> None:
-        pass

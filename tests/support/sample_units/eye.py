@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from handover.cosim.blocks.ports import BLACK_1280X720, Picture1280x720, output, parameter, port
+from support.sample_units.memoryless import Memoryless
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,7 +28,7 @@ class Outputs:
     note_back: bytes = output("the bytes backwards")
 
 
-class Eye:
+class Eye(Memoryless):
     """Adds an offset to a picture."""
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {"brighter": ("picture",), "note_back": ("note",)}
@@ -36,14 +37,5 @@ class Eye:
     def __init__(self, params: Params) -> None:
         self.params = params
 
-    def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
+    def step(self, t: float, dt: float, u: Inputs) -> Outputs:  # noqa: ARG002
         return Outputs(brighter=u.picture + np.uint8(self.params.offset), note_back=u.note[::-1])
-
-    def step(self, t: float, dt: float, u: Inputs) -> Outputs:
-        return self.outputs(t + dt, u)
-
-    def get_state(self) -> bytes:
-        return b""
-
-    def set_state(self, state: bytes) -> None:
-        pass

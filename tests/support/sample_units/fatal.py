@@ -4,11 +4,11 @@ import ctypes
 import threading
 from collections.abc import Mapping
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import ClassVar
 
 from handover.cosim.blocks.ports import output, parameter, port
 from handover.cosim.blocks.units import Number
+from support.sample_units.memoryless import Memoryless
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,11 +26,10 @@ class Outputs:
     y: Number = output("the input")
 
 
-class Crashing:
+class Crashing(Memoryless):
     """y = u, while u is small; then nothing any more."""
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {"y": ("u",)}
-    period: ClassVar[Fraction | None] = None
 
     def __init__(self, params: Params) -> None:
         self.params = params
@@ -46,12 +45,6 @@ class Crashing:
     def die(self) -> None:
         """Read where no memory is."""
         ctypes.string_at(0)
-
-    def get_state(self) -> bytes:
-        return b""
-
-    def set_state(self, state: bytes) -> None:
-        pass
 
 
 class Hanging(Crashing):

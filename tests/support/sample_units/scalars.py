@@ -1,12 +1,10 @@
 """A block with scalars only, to weigh what a step costs beyond the block's own work."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from fractions import Fraction
-from typing import ClassVar
 
 from handover.cosim.blocks.ports import output, parameter, port
 from handover.cosim.blocks.units import Number
+from support.sample_units.memoryless import Memoryless
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,16 +45,13 @@ class Outputs:
     y13: Number = output("output")
 
 
-class Scalars:
+class Scalars(Memoryless):
     """Passes its inputs on."""
-
-    feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}
-    period: ClassVar[Fraction | None] = None
 
     def __init__(self, params: Params) -> None:
         self.params = params
 
-    def outputs(self, t: float, u: Inputs) -> Outputs:
+    def step(self, t: float, dt: float, u: Inputs) -> Outputs:
         return Outputs(
             y1=u.u1,
             y2=u.u2,
@@ -70,14 +65,5 @@ class Scalars:
             y10=u.u10,
             y11=u.u11,
             y12=u.u12,
-            y13=t,
+            y13=t + dt,
         )
-
-    def step(self, t: float, dt: float, u: Inputs) -> Outputs:
-        return self.outputs(t + dt, u)
-
-    def get_state(self) -> bytes:
-        return b""
-
-    def set_state(self, state: bytes) -> None:
-        pass

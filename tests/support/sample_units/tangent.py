@@ -3,13 +3,13 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any, ClassVar
 
 import numpy as np
 
 from handover.cosim.blocks.ports import Vector3, output, parameter, port
 from handover.cosim.blocks.units import Metre, Number, Radian
+from support.sample_units.memoryless import Memoryless
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,21 +32,17 @@ class Outputs:
     p: Vector3[Metre] = output("s x r")
 
 
-class Tangent:
+class Tangent(Memoryless):
     """y = gain n sin(a) |r|^2, p = s x r."""
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {"y": ("a", "n", "r"), "p": ("r", "s")}
-    period: ClassVar[Fraction | None] = None
 
     def __init__(self, params: Params) -> None:
         self.params = params
 
-    def outputs(self, t: float, u: Inputs) -> Outputs:
-        k = self.params.gain * u.n
-        return Outputs(y=k * math.sin(u.a) * float(u.r @ u.r), t_y=t, p=np.cross(u.s, u.r))
-
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:
-        return self.outputs(t + dt, u)
+        k = self.params.gain * u.n
+        return Outputs(y=k * math.sin(u.a) * float(u.r @ u.r), t_y=t + dt, p=np.cross(u.s, u.r))
 
     def directional_derivative(self, t: float, u: Inputs, du: Mapping[str, Any]) -> Mapping[str, Any]:  # noqa: ARG002
         k = self.params.gain * u.n
@@ -55,9 +51,3 @@ class Tangent:
             return {"q": 1.0}
         dy = k * (math.cos(u.a) * da * float(u.r @ u.r) + 2.0 * math.sin(u.a) * float(u.r @ dr))
         return {"y": dy, "p": np.cross(ds, u.r) + np.cross(u.s, dr)}
-
-    def get_state(self) -> bytes:
-        return b""
-
-    def set_state(self, state: bytes) -> None:
-        pass
