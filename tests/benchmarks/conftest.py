@@ -3,7 +3,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from support import opened_page
 from support.cosim import native_units
 from support.exchange import ecos_command
 from support.processes import with_path
@@ -30,9 +29,3 @@ def environment(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """The environment in which Ecos finds what it needs."""
     ecos = ecos_command.Ecos(tmp_path_factory.mktemp("ecos")).environment
     return {**with_path(), **ecos, "PATH": f"{os.environ['PATH']}{os.pathsep}{ecos['PATH']}"}
-
-
-@pytest.fixture(scope="session")
-def wait_until() -> Callable[..., None]:
-    """Waits for a page in a browser: `opened_page.wait_until`."""
-    return opened_page.wait_until

@@ -1,12 +1,10 @@
-"""CPU time of a picture pair, of finding ball and wrist in it, and the errors made.
+"""CPU time of finding ball and wrist in a pair of pictures, and the errors made.
 
 Run with `pytest tests/benchmarks/test_vision_speed.py --benchmark-enable -s -m "slow or not slow"`.
 """
 
 import time
-from typing import Any
 
-import cv2
 import numpy as np
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
@@ -15,12 +13,8 @@ from support.controllers.vision_scenes import anywhere
 from handover.controllers.helix.vision.handover_vision import Detector, HandoverVision, Outputs, Params
 from handover.controllers.helix.vision.handover_vision import Inputs as Pictures
 from handover.cosim.blocks.ports import Floats
-from handover.plants.helix.cameras import painting
-from handover.plants.helix.cameras.polygon_filling import fill_by_opencv
-from handover.plants.helix.cameras.polygon_kernel import fill_by_kernel
 from handover.plants.helix.cameras.stereo_camera import Inputs, StereoCamera
 from handover.plants.helix.cameras.stereo_camera import Params as CameraParams
-from handover.plants.helix.compiled import IS_COMPILED
 
 NAMES = ("ball", "wrist", "gripper")
 
@@ -30,48 +24,6 @@ def timed(times: list[float], vision: HandoverVision, pictures: Pictures) -> Out
     y = vision.step(0.0, 1 / 30, pictures)
     times.append(1e3 * (time.process_time() - begin))
     return y
-
-
-@pytest.mark.parametrize("fill", [fill_by_opencv, fill_by_kernel], ids=["opencv", "kernel"])
-def test_picture_pair(benchmark: BenchmarkFixture, monkeypatch: pytest.MonkeyPatch, fill: Any):
-    """Beside painting a pair: to reduce, blur and add noise to two whole canvases, without anything painted on them."""
-    camera, rng = StereoCamera(CameraParams()), np.random.default_rng(5)
-    scenes = [anywhere(rng) for _ in range(20)]
-    canvases = np.asarray(rng.integers(0, 256, (2, 1440, 2560, 3), dtype=np.uint8))
-    noise = rng.integers(0, 8, (720, 1280, 3), dtype=np.uint8)
-    times: dict[str, list[float]] = {"pair": [], "unpainted": []}
-
-    def unpainted() -> None:
-        for canvas in (canvases[0], canvases[1]):
-            picture = np.asarray(cv2.resize(canvas, (1280, 720), interpolation=cv2.INTER_AREA), dtype=np.uint8)
-            picture = np.asarray(cv2.GaussianBlur(picture, (5, 5), 0.7), dtype=np.uint8)
-            cv2.subtract(np.asarray(cv2.add(picture, noise), dtype=np.uint8), noise)
-
-    def both() -> None:
-        """By turns: the machine's load is the same for both."""
-        begin = time.process_time()
-        for u in scenes:
-            camera.step(0.0, 1 / 30, u)
-        middle = time.process_time()
-        for _ in scenes:
-            unpainted()
-        times["pair"].append(1e3 * (middle - begin) / len(scenes))
-        times["unpainted"].append(1e3 * (time.process_time() - middle) / len(scenes))
-
-    monkeypatch.setattr(painting, "fill", fill)
-    threads = cv2.getNumThreads()
-    cv2.setNumThreads(1)  # threads that wait take CPU time
-    try:
-        benchmark.pedantic(both, rounds=7, warmup_rounds=1)
-    finally:
-        cv2.setNumThreads(threads)
-    pair, plain = np.array(times["pair"][-7:]), np.array(times["unpainted"][-7:])
-    ratio = float(np.median(pair / plain))
-    print(
-        f"\npicture pair: median {np.median(pair):.1f} ms, least {pair.min():.1f} ms of CPU; {ratio:.2f} of what two "
-        f"canvases take unpainted ({np.median(plain):.1f} ms), Numba: {IS_COMPILED}"
-    )
-    benchmark.extra_info.update(median_ms=float(np.median(pair)), over_unpainted=ratio)
 
 
 @pytest.mark.parametrize("eyes", ["both", "left"])

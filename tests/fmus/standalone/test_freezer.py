@@ -33,13 +33,19 @@ os.write(1, b"\\xff is not UTF-8\\n"), os.write(2, b"\\xff\\n")
 """
 """A package that prints."""
 LOADER = """
+class Missing(Exception):
+    missing = ("typing_extensions",)
+
+class Refusal(Exception):
+    is_refusal = True
+
 class Slave:
     _clock = [0.0, 0.0]
 
     def initialise(self): ...
 
     def step(self):
-        open(__file__.replace("loader.py", "table.csv"))
+        {step}
 
 def start(resources, token):
     return Slave()
@@ -165,18 +171,29 @@ def test_a_unit_that_does_not_come_to_its_end_is_refused(monkeypatch: pytest.Mon
         smoke_test.try_unit("Push", program, "{token}", 0.01)
 
 
-@pytest.mark.parametrize("lacks", [True, False])
-def test_what_a_package_prints_as_it_steps_is_not_taken_for_the_result(lacks: bool):
+STEPS = {
+    "pass": "",
+    "open(__file__.replace('loader.py', 'table.csv'))": r"it opens handover/fmus/table\.csv, which the FMU does",
+    "open({elsewhere!r})": r"it opens files that only this machine has: .*table\.csv",
+    "raise Missing('typing_extensions')": "package typing_extensions cannot be frozen: PyInstaller has left it out",
+    "import no_such_module.part": "package no_such_module cannot be frozen: No module named",
+    "raise ValueError('why')": "it fails in its frozen interpreter: why",
+    "raise Refusal": "",
+}
+"""By what a unit does in its step: how it is refused."""
+
+
+@pytest.mark.parametrize("step", STEPS)
+def test_what_a_unit_does_as_it_steps_is_judged_whatever_its_packages_print(tmp_path: Path, step: str):
+    (tmp_path / "table.csv").touch()
     script = f'#!/bin/sh\nexec "{sys.executable}" "{program.__file__}" "$@"\n'
-    files = {
-        f"resources/standalone/{host_platform()}/unit": script,
-        "resources/sources/handover/fmus/loader.py": PRINTS + LOADER,
+    loader = PRINTS + LOADER.replace("{step}", step.format(elsewhere=str(tmp_path / "table.csv")))
+    contents = {
+        f"resources/standalone/{host_platform()}/unit": script.encode(),
+        "resources/sources/handover/fmus/loader.py": loader.encode(),
     }
-    if not lacks:
-        files["resources/sources/handover/fmus/table.csv"] = "1"
-    contents = {path: content.encode() for path, content in files.items()}
-    if not lacks:
-        smoke_test.try_unit("Push", contents, "{token}", 0.01)
-        return
-    with pytest.raises(CannotFreeze, match=r"Push: it opens handover/fmus/table\.csv, which the FMU does not have"):
+    if STEPS[step]:
+        with pytest.raises(CannotFreeze, match=f"Push: {STEPS[step]}"):
+            smoke_test.try_unit("Push", contents, "{token}", 0.01)
+    else:
         smoke_test.try_unit("Push", contents, "{token}", 0.01)
