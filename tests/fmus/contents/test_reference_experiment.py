@@ -28,9 +28,9 @@ from handover.fmus.contents.reference_experiment import (
 from handover.fmus.contents.related_files import CannotRecordExperiment
 
 STEP = Fraction(1, 10)
-CHAOTIC, CHAOTIC_SINGLE, RANDOM, EVERY_KIND = (
+CHAOTIC, RANDOM, EVERY_KIND = (
     Entry(block.rpartition(":")[2], f"support.sample_units.{block}", STEP, "a sample")
-    for block in ("chaotic:Chaotic", "chaotic:ChaoticSingle", "chaotic:Random", "every_kind:EveryKind")
+    for block in ("chaotic:Chaotic", "chaotic:Random", "every_kind:EveryKind")
 )
 
 
@@ -122,20 +122,6 @@ def test_an_input_is_off_by_what_its_range_and_width_allow(chaotic: Path):
         table = SignalTable([Fraction(0)], {"x": [value]})
         (found,) = perturbed(table, {"x": (replace(x, **bounds), 0)}, off_zero=True).columns["x"]
         assert found == (wanted if value else pytest.approx(wanted, rel=1e-7)), (value, declared)
-
-
-@pytest.mark.slow
-def test_a_chaotic_unit_of_a_single_precision_input_is_measured(tmp_path: Path):
-    """1e-7 of 0.5 m, which is the least, becomes 2^8 times that in 8 steps; 1e-13 of it, the input would round away."""
-    fmu = build(CHAOTIC_SINGLE, 3, tmp_path, platforms=["host"])
-    experiment = recorded(fmu, tmp_path, "0.0,0.5\n0.8,0.5\n")
-    assert experiment.tolerance.spread is not None
-    assert experiment.tolerance.spread.greatest == 2.0**-24 * 2**8
-    assert experiment.tolerance.spread.resolution == 2.0**-23
-    assert "(of a Float32 2**-23 at least)" in text_of(experiment)
-    assert "(of a Float32 by 1e-7)" in text_of(experiment)
-    with pytest.raises(CannotRecordExperiment, match="output 'y' changes as inputs round"):
-        recorded(fmu, tmp_path, "0.0,0.5\n2.0,0.5\n")
 
 
 def test_a_unit_that_is_random_whatever_its_inputs_is_not_said_to_round(tmp_path: Path):

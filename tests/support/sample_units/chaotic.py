@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import ClassVar
 
-from handover.cosim.blocks.ports import Single, output, port
+from handover.cosim.blocks.ports import output, port
 from handover.cosim.blocks.units import Metre
 
 
@@ -49,38 +49,6 @@ class Chaotic:
     def set_state(self, state: bytes) -> None:
         y, is_new = struct.unpack("=d?", state)
         self._y = None if is_new else y
-
-
-@dataclass(kw_only=True)
-class SingleInputs:
-    x: Single[Metre] = port(0.5, "place at the start", minimum=0.5, maximum=1.0)
-
-
-@dataclass(kw_only=True)
-class SingleOutputs:
-    y: Single[Metre] = output("place")
-
-
-class ChaoticSingle:
-    """The same with an input and an output of single precision."""
-
-    feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {"y": ("x",)}
-    period: ClassVar[Fraction | None] = None
-
-    def __init__(self, params: Params) -> None:
-        self._chaotic = Chaotic(params)
-
-    def outputs(self, t: float, u: SingleInputs) -> SingleOutputs:
-        return SingleOutputs(y=self._chaotic.outputs(t, Inputs(x=u.x)).y)
-
-    def step(self, t: float, dt: float, u: SingleInputs) -> SingleOutputs:
-        return SingleOutputs(y=self._chaotic.step(t, dt, Inputs(x=u.x)).y)
-
-    def get_state(self) -> bytes:
-        return self._chaotic.get_state()
-
-    def set_state(self, state: bytes) -> None:
-        self._chaotic.set_state(state)
 
 
 class Random(Chaotic):
