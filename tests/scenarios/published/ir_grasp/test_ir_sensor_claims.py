@@ -1,41 +1,29 @@
 """The experiment `ir-sensor`: what it runs, and what it makes of made-up results."""
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable
 
-import pyarrow as pa
 import pytest
+from support.made_tables import empty, made_table, one
 
 from handover.scenarios.campaign.plan import PlannedRun
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.ir_grasp.ir_sensor import AT
 from handover.scenarios.published.ir_grasp.ir_sensor import IrSensorCurve
 from handover.scenarios.published.ir_grasp.ir_sensor_cases import REFLECTIVITIES, TOLERANCES, Case, SensorRuns
-from handover.scenarios.published.published_experiment import Claim, Verdict
+from handover.scenarios.published.published_experiment import Verdict
 
 
-def sensor_table(quick: bool = False, **metrics: Callable[[PlannedRun], float | None]) -> CampaignTable:
+def sensor_table(**metrics: Callable[[PlannedRun], float | None]) -> CampaignTable:
     """Return a table of the whole plan in which sensors are on their curve, but for metrics as given."""
-
-    def row(run: PlannedRun) -> Mapping[str, Any]:
-        figures: dict[str, Any] = {"rank_correlation": 1.0, "first_seen": 0.064, "fit_residual": 3e-4, **AT}
-        figures.update({"fit_a": 0.062, "fit_b": -0.003, "fit_c": 0.022, "fit_d": -0.00043})
-        figures.update({name: of(run) for name, of in metrics.items()})
-        return {
-            "run": run.name,
-            "status": "done",
-            "success": True,
-            "finger": run.parameters["finger"],
-            **{name: float(run.parameters[name]) for name in ("reflectivity", "incidence", "scene.sensor_tolerance")},
-            **figures,
-        }
-
-    return CampaignTable(pa.Table.from_pylist([dict(row(run)) for run in IrSensorCurve().plan(quick).runs()]))
-
-
-def one(claims: Sequence[Claim], begin: str) -> Claim:
-    (found,) = (claim for claim in claims if claim.claim.startswith(begin))
-    return found
+    usual = {"rank_correlation": 1.0, "first_seen": 0.064, "fit_residual": 3e-4, **AT}
+    usual |= {"fit_a": 0.062, "fit_b": -0.003, "fit_c": 0.022, "fit_d": -0.00043}
+    return made_table(
+        {"run": run.name, "status": "done", "success": True, "finger": run.parameters["finger"]}
+        | {name: float(run.parameters[name]) for name in ("reflectivity", "incidence", "scene.sensor_tolerance")}
+        | usual
+        | {name: of(run) for name, of in metrics.items()}
+        for run in IrSensorCurve().plan(quick=False).runs()
+    )
 
 
 def test_the_whole_plan_has_every_sensor_material_and_tolerance():
@@ -45,27 +33,20 @@ def test_the_whole_plan_has_every_sensor_material_and_tolerance():
     assert len(runs.rows(Case(incidence=0.4))) == 3
 
 
-def test_what_follows_from_the_scenes_own_assumptions_has_no_verdict():
-    claims = IrSensorCurve().claims(sensor_table())
-    assert one(claims, "Distance over reading").verdict is Verdict.NOT_COMPARABLE
-    assert one(claims, "a, b, c, d vary only slightly").verdict is Verdict.NOT_COMPARABLE
-
-
-def test_constants_are_told_by_their_largest_deviation_from_the_mean():
+def test_what_follows_from_the_scenes_own_assumptions_is_told_of_the_worst_and_has_no_verdict():
     def off(run: PlannedRun) -> float:
         return -0.003 * (1.2 if run.parameters["finger"] == "thumb" else 0.9)
 
-    claim = one(IrSensorCurve().claims(sensor_table(fit_b=off)), "a, b, c, d vary")
-    assert claim.measured.startswith("off by 0 %: 20 %")
-
-
-def test_that_readings_keep_the_order_is_told_of_the_worst_material_and_judged_of_none():
     def lost(run: PlannedRun) -> float:
         return 0.98 if run.parameters["reflectivity"] == "2" and run.repetition == 0 else 1.0
 
-    claim = one(IrSensorCurve().claims(sensor_table(rank_correlation=lost)), "A relative estimate")
-    assert claim.verdict is Verdict.NOT_COMPARABLE
-    assert claim.measured == "rank correlation 0.9800 at least (reflectivity 2)"
+    claims = IrSensorCurve().claims(sensor_table(fit_b=off, rank_correlation=lost))
+    told = {"Distance over": "", "a, b, c, d vary": "off by 0 %: 20 %"}
+    told["A relative estimate"] = "rank correlation 0.9800 at least (reflectivity 2)"
+    for part, measured in told.items():
+        claim = one(claims, part)
+        assert claim.verdict is Verdict.NOT_COMPARABLE
+        assert claim.measured.startswith(measured)
 
 
 @pytest.mark.parametrize(("error", "holds"), [(0.0039, True), (0.0041, False)])
@@ -88,6 +69,6 @@ def test_a_distance_that_most_runs_do_not_see_is_told_as_not_seen():
 
 
 def test_without_runs_there_are_no_verdicts():
-    empty = CampaignTable(sensor_table().table.slice(0, 0))
-    assert {c.verdict for c in IrSensorCurve().claims(empty)} == {Verdict.NOT_COMPARABLE}
-    assert [len(t.rows) for t in IrSensorCurve().tables(empty)] == [1, 0, 0]  # the controller's own curve
+    nothing = empty(sensor_table())
+    assert {c.verdict for c in IrSensorCurve().claims(nothing)} == {Verdict.NOT_COMPARABLE}
+    assert [len(t.rows) for t in IrSensorCurve().tables(nothing)] == [1, 0, 0]  # the controller's own curve
