@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.scenarios.flyer_runs import kept, metric, run
+from support.wording import Wording
 
 from handover.cosim.exceptions import InitializationError
 from handover.cosim.record.reader import Record
@@ -33,10 +34,11 @@ def test_with_fixed_joints_the_model_is_that_of_one_body_and_the_base_does_it_al
 
 @pytest.mark.slow
 def test_joints_that_lock_unknown_to_the_controller_depart_from_the_model(tmp_path: Path):
-    ended = run(FlyerArmImpedance, tmp_path / "r", "lock_time=1.25")
+    ended = run(FlyerArmImpedance, tmp_path / "r", "lock_time=1.25", "propulsion=nozzles", "stuck_nozzle=3")
     assert not ended.outcome.success
     assert "departed from the impedance model" in ended.outcome.reason
     assert "joint 1 was held at" in ended.outcome.reason
+    assert "nozzle 3 was stuck closed" in ended.outcome.reason
     record = Record(tmp_path / "r" / "signals.parquet")
     assert len(np.unique(record["robot.q_J"][record.time > 1.28], axis=0)) == 1
 
@@ -48,9 +50,23 @@ def test_a_joint_at_its_end_stop_is_told(tmp_path: Path):
     assert "of which 7 mm and 1.1° at most agree" in ended.outcome.reason
 
 
-def test_the_published_rigid_damping_is_refused_with_joints(tmp_path: Path):
-    with pytest.raises(InitializationError, match="unstable"):
-        run(FlyerArmImpedance, tmp_path / "r", "rotational_damping=5")
+@pytest.mark.parametrize(
+    "given",
+    [
+        ("rotational_damping=5",),  # the published one, rigid
+        pytest.param(("delay=0.05", "navigation_delay=0.1"), marks=pytest.mark.slow),
+    ],
+)
+def test_what_makes_the_loop_unstable_is_refused(tmp_path: Path, given: tuple[str, ...], wording: Wording):
+    with pytest.raises(InitializationError) as refused:
+        run(FlyerArmImpedance, tmp_path / "r", *given)
+    wording.check(refused.value)
+
+
+@pytest.mark.slow
+def test_the_age_of_the_estimate_reaches_navigation_and_controller(tmp_path: Path):
+    late = run(FlyerArmImpedance, tmp_path / "late", "navigation_delay=0.004", stop=0.1)
+    assert metric(late, "pole_margin_impedance") < kept("flyer_arm_impedance").metric("pole_margin_impedance")
 
 
 def test_factors_of_the_arm_scale_its_links():
@@ -59,16 +75,3 @@ def test_factors_of_the_arm_scale_its_links():
     np.testing.assert_allclose(robot["link"][0], [-0.2, 0.0, 0.0])
     np.testing.assert_allclose(model["link"][0], [-0.05, 0.0, 0.0])
     np.testing.assert_allclose(model["mass_L"], 0.7 * robot["mass_L"])
-
-
-@pytest.mark.slow
-def test_the_age_of_the_estimate_reaches_navigation_and_controller(tmp_path: Path):
-    with pytest.raises(InitializationError, match=r"with a delay of 0\.15 s"):
-        run(FlyerArmImpedance, tmp_path / "r", "delay=0.05", "navigation_delay=0.1")
-    late = run(FlyerArmImpedance, tmp_path / "late", "navigation_delay=0.004", stop=0.5)
-    assert metric(late, "pole_margin_impedance") < kept("flyer_arm_impedance").metric("pole_margin_impedance")
-
-
-def test_a_nozzle_that_is_stuck_is_told(tmp_path: Path):
-    ended = run(FlyerArmImpedance, tmp_path / "r", "propulsion=nozzles", "stuck_nozzle=3", stop=0.1)
-    assert ended.outcome.reason.endswith("; nozzle 3 was stuck closed")

@@ -43,40 +43,48 @@ def test_the_five_inputs_of_a_hand_come_from_outside_and_nothing_else(scenario: 
     outside.check()
 
 
-def test_an_object_in_a_hand_that_nothing_leads_stays_in_it_and_the_verdict_blames_no_simulated_person(tmp_path: Path):
-    ended = run(HumanToRobot, tmp_path / "run", "hand=outside", "patience=15")
-    assert "the object in the hand came no nearer than" in ended.outcome.reason
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("scenario", "words", "holder"),
+    [
+        (HumanToRobot, "the object in the hand came no nearer than", {2}),
+        (RobotToHuman, "the hand was never closed; the nearest that it came", {0, 1}),
+    ],
+)
+def test_a_hand_that_nothing_leads_keeps_or_takes_nothing_and_no_simulated_person_is_blamed(
+    tmp_path: Path, scenario: type[FlyerHandover], words: str, holder: set[int]
+):
+    ended = run(scenario, tmp_path / "run", "hand=outside", "patience=15")
+    assert words in ended.outcome.reason
     assert metric(ended, "decided_by") == Cause.NOT_TRIED
     record = Record(tmp_path / "run" / "signals.parquet")
-    assert set(record["person.holder"].tolist()) == {2}
+    assert set(record["person.holder"].tolist()) == holder
     assert (record["person.age"] > 0.2).all()
     assert np.ptp(record["person.p_WH"], axis=0).max() == 0.0
     assert record["person.activity"].max() == 0
 
 
-@pytest.mark.slow
-def test_a_hand_that_nothing_leads_does_not_take_the_object(tmp_path: Path):
-    ended = run(RobotToHuman, tmp_path / "run", "hand=outside", "patience=20")
-    assert "the hand was never closed; the nearest that it came" in ended.outcome.reason
-    assert metric(ended, "decided_by") == Cause.NOT_TRIED
-
-
 def test_the_command_says_that_nobody_leads_it(tmp_path: Path):
-    for led, told in (("simulated", False), ("outside", True)):
-        given = ["run", "flyer_robot_to_human", "-p", f"hand={led}", "--stop", "0.1", "--no-report"]
-        done = CliRunner().invoke(main, [*given, "--out", str(tmp_path / led)])
-        assert ("nobody leads the hand" in done.output) is told, done.output
+    given = ["run", "flyer_robot_to_human", "-p", "hand=outside", "--stop", "0.1", "--no-report"]
+    done = CliRunner().invoke(main, [*given, "--out", str(tmp_path / "run")])
+    assert "nobody leads the hand" in done.output
 
 
-def test_what_only_a_simulated_person_has_is_refused_with_the_reason(tmp_path: Path, wording: Wording):
-    given = ["hand=outside", "skill=0.5", "interface_delay=0.1", f"hand_track={tmp_path / 't.csv'}", "strength=3"]
+@pytest.mark.parametrize(
+    ("scenario", "given", "faults"),
+    [
+        (
+            RobotToHuman,
+            ("skill=0.5", "interface_delay=0.1", "hand_track=t.csv", "strength=3"),
+            ["hand_track", "skill", "interface_delay"],
+        ),
+        (TwoRobots, (), ["hand"]),
+    ],
+)
+def test_what_only_a_simulated_person_has_is_refused_with_the_reason(
+    scenario: type[Experiment[Any]], given: tuple[str, ...], faults: list[str], wording: Wording
+):
     with pytest.raises(InvalidParameter) as refused:
-        built(RobotToHuman, *given)
-    assert [fault.partition(":")[0] for fault in refused.value.faults] == ["hand_track", "skill", "interface_delay"]
-    wording.check(refused.value)
-
-
-def test_two_hands_cannot_come_from_outside(wording: Wording):
-    with pytest.raises(InvalidParameter) as refused:
-        built(TwoRobots, "hand=outside")
+        built(scenario, "hand=outside", *given)
+    assert [fault.partition(":")[0] for fault in refused.value.faults] == faults
     wording.check(refused.value)

@@ -39,8 +39,12 @@ CODE = {
     "impedance": ImpedanceParams,
     "pose": PoseParams,
     "decision": DecisionParams,
+    "decision + team_decision": TeamDecisionParams,
     "push_scenario": PushScenarioParameters,
+    "push_scenario + arm_push_scenario": ArmPushParameters,
     "handover_scenario": HandoverParameters,
+    "handover_scenario + task_scenario": TaskParameters,
+    "handover_scenario + team_scenario": TeamParameters,
 }
 
 
@@ -50,35 +54,34 @@ def paper() -> Paper:
     return tomli.loads(file.read_text(encoding="utf-8"))
 
 
-@pytest.mark.parametrize("group", CODE)
-def test_every_default_has_its_origin(paper: Paper, group: str):
-    assert_every_default_has_its_origin(paper[group], CODE[group])
+@pytest.mark.parametrize("groups", CODE)
+def test_every_default_has_its_origin(paper: Paper, groups: str):
+    origins = {name: entry for group in groups.split(" + ") for name, entry in paper[group].items()}
+    assert_every_default_has_its_origin(origins, CODE[groups])
 
 
-def test_the_scenario_of_any_task_has_its_parameters_origins(paper: Paper):
-    assert_every_default_has_its_origin(paper["handover_scenario"] | paper["task_scenario"], TaskParameters)
-
-
-def test_two_robots_have_their_parameters_origins(paper: Paper):
+def test_the_large_object_has_its_parameters_origins(paper: Paper):
     names = {f.name for f in fields(ContactParams)}
     of_handle = {name: entry for name, entry in paper["person"].items() if name in names}
     assert_every_default_has_its_origin(of_handle | paper["large_object"], LargeObjectParams)
-    assert_every_default_has_its_origin(paper["decision"] | paper["team_decision"], TeamDecisionParams)
-    assert_every_default_has_its_origin(paper["handover_scenario"] | paper["team_scenario"], TeamParameters)
 
 
-def test_two_robots_begin_where_they_and_the_person_expect_the_object(paper: Paper):
-    place, decision = paper["team_place"], paper["team_decision"]
-    for name in ("p_WO_0", "p_OG", "grip_spacing"):
-        assert decision[name]["value"] == paper["large_object"][name]["value"]
-    assert place["p_WO_0"]["value"] == decision["p_WO_0"]["value"]
-    assert place["angle_0"]["value"] == paper["person"]["angle_empty"]["value"]
-    assert decision["p_WG_handover"]["value"] == paper["team_scenario"]["p_WG_handover"]["value"]
-    assert paper["team_scenario"]["object_mass"]["value"] == paper["large_object"]["object_mass"]["value"]
-
-
-def test_the_push_on_an_arm_has_its_parameters_origins(paper: Paper):
-    assert_every_default_has_its_origin(paper["push_scenario"] | paper["arm_push_scenario"], ArmPushParameters)
+def test_runs_and_pictures_begin_where_person_and_robot_expect_the_object(paper: Paper):
+    for one, other in (
+        ("decision.p_WO_0", "large_object.p_WO_0"),
+        ("decision.p_OG", "large_object.p_OG"),
+        ("decision.grip_spacing", "large_object.grip_spacing"),
+        ("decision.p_WO_0", "place.p_WO_0"),
+        ("decision.p_WG_handover", "scenario.p_WG_handover"),
+        ("scenario.object_mass", "large_object.object_mass"),
+    ):
+        values = (f"team_{text}".replace("team_large", "large").split(".") for text in (one, other))
+        assert len({str(paper[group][name]["value"]) for group, name in values}) == 1, other
+    person, place = paper["person"], paper["handover_place"]
+    assert place["angle_0"]["value"] == paper["team_place"]["angle_0"]["value"] == person["angle_empty"]["value"]
+    assert [place[n]["value"] for n in ("p_WO_0", "p_OG")] == [person[n]["value"] for n in ("p_WO_0", "p_OG")]
+    assert paper["scene"]["edge"]["value"] == scene.EDGE
+    assert (person["object_size"]["value"], person["palm_depth"]["value"]) == (list(scene.OBJECT), scene.PALM_DEPTH)
 
 
 def test_robot_and_controller_know_the_same_arm(paper: Paper):
@@ -90,7 +93,7 @@ def test_robot_and_controller_know_the_same_arm(paper: Paper):
 
 
 @pytest.mark.parametrize("behaviour", [Behaviour.RIGID, Behaviour.COMPLIANT])
-def test_the_gains_are_those_of_table_4_1(paper: Paper, behaviour: Behaviour):
+def test_gains_and_thresholds_are_the_published_ones(paper: Paper, behaviour: Behaviour):
     params = ImpedanceParams(behaviour=behaviour)
     body, gains = params.body(), params.gains()
     table = {name: entry["value"] for name, entry in paper[f"gains_{behaviour.name.lower()}"].items()}
@@ -98,24 +101,7 @@ def test_the_gains_are_those_of_table_4_1(paper: Paper, behaviour: Behaviour):
     assert np.allclose(gains.damping_translation, table["k_B_linear"] * np.eye(3))
     assert np.allclose(gains.stiffness_rotation, table["k_D_rotational"] * np.asarray(body.I_B))
     assert np.allclose(gains.damping_rotation, table["k_B_rotational"] * np.eye(3))
-
-
-@pytest.mark.parametrize("behaviour", [Behaviour.RIGID, Behaviour.COMPLIANT])
-def test_the_thresholds_are_the_published_ones(paper: Paper, behaviour: Behaviour):
-    published = paper["published"]
-    release, receive = DecisionParams(behaviour=behaviour).velocities()
-    assert release == published["velocity_hand"]["value"][behaviour]
-    assert receive == published["velocity_gripper"]["value"][behaviour]
-    assert DecisionParams().angle_threshold == published["angle_threshold"]["value"]
-
-
-def test_the_pictures_are_of_what_is_simulated(paper: Paper):
-    assert paper["scene"]["edge"]["value"] == scene.EDGE
-    assert paper["person"]["object_size"]["value"] == list(scene.OBJECT)
-    assert paper["person"]["palm_depth"]["value"] == scene.PALM_DEPTH
-
-
-def test_a_handover_begins_where_person_and_robot_expect_it(paper: Paper):
-    assert paper["handover_place"]["p_WO_0"]["value"] == paper["person"]["p_WO_0"]["value"]
-    assert paper["handover_place"]["angle_0"]["value"] == paper["person"]["angle_empty"]["value"]
-    assert paper["handover_place"]["p_OG"]["value"] == paper["person"]["p_OG"]["value"]
+    published = {name: entry["value"] for name, entry in paper["published"].items()}
+    thresholds = published["velocity_hand"][behaviour], published["velocity_gripper"][behaviour]
+    assert DecisionParams(behaviour=behaviour).velocities() == thresholds
+    assert DecisionParams().angle_threshold == published["angle_threshold"]

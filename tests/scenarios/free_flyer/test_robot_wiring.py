@@ -40,7 +40,10 @@ def test_an_arm_that_nothing_drives_is_refused(
 
 @pytest.mark.parametrize(
     "given",
-    [("model_mass_factor=3", "behaviour=compliant"), ("delay=0.05", "navigation_delay=0.05"), ("pose.mass=48",)],
+    [
+        ("pose.mass=48", "model_mass_factor=3", "behaviour=compliant"),
+        pytest.param(("delay=0.05", "navigation_delay=0.05"), marks=pytest.mark.slow),
+    ],
 )
 def test_a_unit_that_does_not_start_names_what_was_set(tmp_path: Path, given: tuple[str, ...], wording: Wording):
     with pytest.raises(InitializationError) as refused:

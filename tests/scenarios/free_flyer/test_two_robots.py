@@ -34,17 +34,11 @@ def test_two_robots_give_a_large_object_to_a_person():
 
 
 @pytest.mark.slow
-def test_a_person_gives_a_large_object_to_two_robots(tmp_path: Path):
-    done = run(TwoRobots, tmp_path / "run", "task=human_to_robots", seed=1)
+def test_a_person_gives_a_large_object_to_two_compliant_robots(tmp_path: Path):
+    done = run(TwoRobots, tmp_path / "run", "task=human_to_robots", "behaviour=compliant", seed=1)
     assert done.outcome.success, done.outcome.reason
     assert metric(done, "squeeze") < 0.5
     assert metric(done, "turn") < 0.1
-
-
-@pytest.mark.slow
-def test_compliant_robots_give_a_large_object_to_a_person(tmp_path: Path):
-    done = run(TwoRobots, tmp_path / "run", "behaviour=compliant", seed=3)
-    assert done.outcome.success, done.outcome.reason
 
 
 @pytest.mark.slow
@@ -66,31 +60,25 @@ ONE_AT_END = ("task=human_to_robots", "hands=one_at_end")
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("given", "why"),
+    ("given", "why", "receptions"),
     [
-        (("hand_delay=1",), TeamCause.TORN_OUT),
-        ((*ONE_AT_END, "together=false", "patience=20"), TeamCause.ONE_RECEIVED_ALONE),
-        (("strength=0.3", "hand_delay=3", "patience=20"), TeamCause.ONE_HAND_HELD),
-        (("verify=true",), TeamCause.RAN_INTO_IT),
+        (("hand_delay=1",), TeamCause.TORN_OUT, None),
+        ((*ONE_AT_END, "decision.attempts=2"), TeamCause.ONE_RECEIVED_ALONE, 1.0),  # both open again
+        (("strength=0.3", "hand_delay=3", "patience=20"), TeamCause.ONE_HAND_HELD, None),
+        (("verify=true",), TeamCause.RAN_INTO_IT, None),
     ],
 )
-def test_a_run_that_fails_says_why(given: tuple[str, ...], why: TeamCause, tmp_path: Path):
-    done = run(TwoRobots, tmp_path / "run", *given, seed=1 if "together=false" in given else 0)
+def test_a_run_that_fails_says_why(given: tuple[str, ...], why: TeamCause, receptions: float | None, tmp_path: Path):
+    done = run(TwoRobots, tmp_path / "run", *given)
     assert not done.outcome.success
     assert cause(metric(done, "decided_by")) is why, done.outcome.reason
-
-
-@pytest.mark.slow
-def test_grippers_that_receive_together_both_open_again_where_one_hand_fills_one_first(tmp_path: Path):
-    done = run(TwoRobots, tmp_path / "run", *ONE_AT_END, "decision.attempts=2")
-    assert metric(done, "failed_receptions") > 0.0
-    assert cause(metric(done, "decided_by")) is TeamCause.ONE_RECEIVED_ALONE
+    assert receptions is None or metric(done, "failed_receptions") >= receptions
 
 
 @pytest.mark.slow
 def test_robots_that_do_not_come_to_rest_tell_how_far_from_their_places_they_were(tmp_path: Path):
     noise = (f"navigation_{i}.velocity_noise=0.015" for i in (1, 2))
-    done = run(TwoRobots, tmp_path / "run", *noise)
+    done = run(TwoRobots, tmp_path / "run", *noise, "patience=30")
     assert cause(metric(done, "decided_by")) is TeamCause.OUT_OF_REACH, done.outcome.reason
     away = re.findall(r"gripper (\d) was (\d+) mm from its place", done.outcome.reason)
     record = Record(tmp_path / "run" / "signals.parquet")
@@ -105,20 +93,14 @@ def test_robots_that_do_not_come_to_rest_tell_how_far_from_their_places_they_wer
 
 
 def test_a_run_is_drawn_with_its_moments_and_curves(tmp_path: Path, sketches: Sketches):
-    done = run(TwoRobots, tmp_path / "run", "hands=one_at_middle", stop=1.0)
-    assert not done.outcome.success
+    run(TwoRobots, tmp_path / "run", "hands=one_at_middle", stop=1.0)
     parameters = parse_parameters(TwoRobots, ("hands=one_at_middle",))
-    record = Record(tmp_path / "run" / "signals.parquet")
-    evaluator = TeamEvaluator(parameters)
+    record, evaluator = Record(tmp_path / "run" / "signals.parquet"), TeamEvaluator(parameters)
     evaluator.robots[0].signalled, evaluator.robots[1].felt = 0.2, 0.7
     TwoRobots().draw(parameters, evaluator, record, tmp_path)
     titles = [axes.get_title().partition("\n")[0] for axes in sketches["scene"].axes]
     assert titles[:4] == ["0.0 s, start", "0.2 s, signal", "0.7 s, pull felt", "1.0 s, end"]
-    figures = TwoRobots().time_figures(parameters, record)
-    assert {*sketches, *(figure.name for figure in figures)} == {
-        "scene", "positions", "orientation", "forces", "grippers", "thrust_1", "thrust_2"
-    }  # fmt: skip
-    plots = [plot for figure in figures for plot in figure.plots]
+    plots = [plot for figure in TwoRobots().time_figures(parameters, record) for plot in figure.plots]
     assert len({plot.title for plot in plots}) == len(plots)
     assert not any("hand 2" in curve.label for plot in plots for curve in plot.curves)
 

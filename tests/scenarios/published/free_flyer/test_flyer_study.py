@@ -5,12 +5,11 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import pyarrow as pa
 import pytest
+from support.scenarios.made_tables import made_table
 from support.sketched_figures import Sketches
 from support.sketched_figures import sketches as sketches
 
-from handover.scenarios.campaign.plan_check import checked_plan
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.free_flyer.handover.person_evaluation import Cause
 from handover.scenarios.free_flyer.parameters import Behaviour, Task
@@ -24,6 +23,8 @@ from handover.scenarios.published.free_flyer.study_runs import (
 from handover.scenarios.published.published_experiment import Claim, Verdict
 
 NAMES = [trait.name for trait in TRAITS]
+H2 = "The rigid robot succeeds more often (H2): collaborative"
+BESIDE = "Participants and tasks, beside table 5.1"
 
 
 def by_skill(given: Mapping[str, str], k: int) -> bool:
@@ -32,7 +33,7 @@ def by_skill(given: Mapping[str, str], k: int) -> bool:
     return (7 * k + 3) % 20 < 10 * times * (1.0 - float(given["skill"]))
 
 
-def always(given: Mapping[str, str], k: int) -> bool:  # noqa: ARG001
+def always(_given: Mapping[str, str], _k: int) -> bool:
     """Return that every trial fails."""
     return True
 
@@ -40,11 +41,6 @@ def always(given: Mapping[str, str], k: int) -> bool:  # noqa: ARG001
 def one_in_twenty(_given: Mapping[str, str], k: int) -> bool:
     """Return whether it is one of the repetitions, whatever the skill."""
     return k == 7
-
-
-def never(_given: Mapping[str, str], _k: int) -> bool:
-    """Return that no trial fails."""
-    return False
 
 
 @cache
@@ -55,10 +51,10 @@ def table_of(fails: Callable[[Mapping[str, str], int], bool] = by_skill, quick: 
         given = run.parameters
         failed = fails(given, run.repetition)
         row: dict[str, Any] = {"status": "done", "run": run.name, "seed": run.seed, "success": not failed}
-        row |= {"task": given["task"], "behaviour": given["behaviour"]}
+        row |= {"task": given["task"], "behaviour": given["behaviour"], "reason": ""}
         row |= {name: float(given[name]) if name in given else None for name in NAMES}
-        rows.append(row | {"decided_by": int(Cause.BUMPED if failed else Cause.NONE), "reason": ""})
-    return CampaignTable(pa.Table.from_pylist(rows))
+        rows.append(row | {"decided_by": int(Cause.BUMPED if failed else Cause.NONE)})
+    return made_table(rows)
 
 
 @cache
@@ -66,21 +62,14 @@ def verdicts(table: CampaignTable) -> dict[str, Claim]:
     return {claim.claim: claim for claim in FlyerStudy().claims(table)}
 
 
-def test_the_plans_are_sound_and_have_the_thesis_tasks_for_ten_participants():
-    plan = checked_plan(FlyerStudy().plan(quick=False))
-    assert checked_plan(FlyerStudy().plan(quick=True)).size < 100
-    assert plan.size == 3 * 2 * (10 + 5) * 20
-    assert len({tuple(person.values()) for person in participants()}) == 10
-
-
 def test_both_behaviours_share_the_seeds_of_a_participants_trials_and_nobody_else_does():
-    seeds: dict[tuple[str, ...], list[int]] = {}
+    seeds: dict[str, dict[tuple[str, ...], list[int]]] = {"rigid": {}, "compliant": {}}
     for run in FlyerStudy().plan(quick=False).runs():
         who = tuple(run.parameters.get(name, "") for name in ("task", *NAMES))
-        seeds.setdefault((run.parameters["behaviour"], *who), []).append(run.seed)
-    rigid = {who[1:]: found for who, found in seeds.items() if who[0] == "rigid"}
-    assert all(seeds[("compliant", *who)] == found for who, found in rigid.items())
-    assert len({seed for found in rigid.values() for seed in found}) == 3 * 15 * 20
+        seeds[run.parameters["behaviour"]].setdefault(who, []).append(run.seed)
+    assert seeds["rigid"] == seeds["compliant"]
+    assert len({seed for found in seeds["rigid"].values() for seed in found}) == 3 * 15 * 20
+    assert len({tuple(person.values()) for person in participants()}) == 10
 
 
 def test_a_participants_trials_are_told_from_those_of_a_skill():
@@ -90,66 +79,58 @@ def test_a_participants_trials_are_told_from_those_of_a_skill():
     assert len(runs.of_skill(0.5, Task.COLLABORATIVE, Behaviour.COMPLIANT)) == 20
 
 
-def test_failures_that_grow_with_less_skill_are_noticed():
-    claims = verdicts(table_of())
-    grow = [c for name, c in claims.items() if name.startswith("Failures grow")]
-    assert [c.verdict for c in grow] == [Verdict.REPRODUCED] * 3
-    assert claims["The rigid robot succeeds more often (H2): collaborative"].verdict is Verdict.REPRODUCED
-
-
-def test_failures_that_do_not_are_noticed_too():
-    claims = verdicts(table_of(one_in_twenty))
-    grow = [c for name, c in claims.items() if name.startswith("Failures grow")]
-    assert [c.verdict for c in grow] == [Verdict.NOT_REPRODUCED] * 3
-    assert claims["The rigid robot succeeds more often (H2): collaborative"].verdict is Verdict.NOT_REPRODUCED
-    nominal = next(c for name, c in claims.items() if name.startswith("Persons of nominal skill"))
-    assert nominal.verdict is Verdict.REPRODUCED
-
-
-def test_rates_far_from_the_published_are_not_reproduced():
-    claims = verdicts(table_of(always))
-    rates = [c for name, c in claims.items() if name.startswith("Handovers that succeed")]
-    assert [c.verdict for c in rates] == [Verdict.NOT_REPRODUCED] * 6
+@pytest.mark.parametrize(
+    ("fails", "begin", "verdict"),
+    [
+        (by_skill, "Failures grow", Verdict.REPRODUCED),
+        (by_skill, H2, Verdict.REPRODUCED),
+        (one_in_twenty, "Failures grow", Verdict.NOT_REPRODUCED),
+        (one_in_twenty, H2, Verdict.NOT_REPRODUCED),
+        (one_in_twenty, "Persons of nominal skill", Verdict.REPRODUCED),
+        (always, "Handovers that succeed", Verdict.NOT_REPRODUCED),
+    ],
+)
+def test_whether_failures_grow_with_less_skill_and_the_rigid_robot_does_better_is_noticed(
+    fails: Callable[[Mapping[str, str], int], bool], begin: str, verdict: Verdict
+):
+    found = [c.verdict for name, c in verdicts(table_of(fails)).items() if name.startswith(begin)]
+    assert set(found) == {verdict}
+    assert len(found) == {"Failures grow": 3, "Handovers that succeed": 6}.get(begin, 1)
 
 
 def test_of_the_quick_plans_runs_and_of_none_nothing_is_concluded():
-    assert {c.verdict for c in verdicts(table_of(quick=True)).values()} == {Verdict.NOT_COMPARABLE}
-    nothing = CampaignTable(pa.Table.from_pylist([{"status": "failed"}]))
-    assert {c.verdict for c in verdicts(nothing).values()} == {Verdict.NOT_COMPARABLE}
+    for table in (table_of(quick=True), made_table([{"status": "failed"}])):
+        assert {c.verdict for c in verdicts(table).values()} == {Verdict.NOT_COMPARABLE}
 
 
-@pytest.mark.parametrize("quick", [False, True])
-def test_tables_and_figures_are_made_of_what_there_is(quick: bool, tmp_path: Path, sketches: Sketches):
-    table = table_of(quick=quick)
-    tables = FlyerStudy().tables(table)
-    assert tables[-1].title == "Failures by skill"
-    FlyerStudy().draw(table, tmp_path, tmp_path)
+@pytest.mark.parametrize("quick", [pytest.param(False, marks=pytest.mark.slow), True])
+def test_figures_are_drawn_of_what_there_is(quick: bool, tmp_path: Path, sketches: Sketches):
+    FlyerStudy().draw(table_of(quick=quick), tmp_path, tmp_path)
     sketches.check(*(["skill"] if quick else ["skill", "causes"]))
-    by_title = {t.title: t for t in tables}
-    assert ("The participants" in by_title) is not quick
-    of_participants = by_title.get("Participants and tasks, beside table 5.1")
-    assert (of_participants is None) is quick
-    if of_participants is not None:
-        assert "no person took part" in tables[0].note
-        *persons, every, published = of_participants.rows
-        assert len(persons) == 10
-        assert all("of 20," in cell for row in persons for cell in row[1:])
-        assert all("of 200," in cell for cell in every[1:])
-        assert published[1:3] == ["3 of 20, 15 % (3 to 38 %)"] * 2
+
+
+def test_tables_have_a_row_for_each_participant_beside_the_published():
+    quick, tables = ({t.title: t for t in FlyerStudy().tables(table_of(quick=q))} for q in (True, False))
+    assert {"The participants", BESIDE} <= tables.keys() - quick.keys()
+    assert list(tables)[-1] == list(quick)[-1] == "Failures by skill"
+    assert "no person took part" in next(iter(tables.values())).note
+    *persons, every, published = tables[BESIDE].rows
+    assert len(persons) == 10
+    assert all("of 20," in cell for row in persons for cell in row[1:])
+    assert all("of 200," in cell for cell in every[1:])
+    assert published[1:3] == ["3 of 20, 15 % (3 to 38 %)"] * 2
 
 
 def test_pairs_go_by_seed_and_not_by_place():
     """The first trial of the rigid robot is missing: all others keep their like."""
     rows = table_of().rows
     gone = next(k for k, row in enumerate(rows) if row["behaviour"] == "rigid" and row["task"] == "collaborative")
-    rest = CampaignTable(pa.Table.from_pylist([row for k, row in enumerate(rows) if k != gone]))
-    text = "The rigid robot succeeds more often (H2): collaborative"
-    whole, claim = verdicts(table_of())[text], verdicts(rest)[text]
-    assert claim.verdict is whole.verdict is Verdict.REPRODUCED
+    rest = made_table(row for k, row in enumerate(rows) if k != gone)
+    claim = verdicts(rest)[H2]
+    assert claim.verdict is Verdict.REPRODUCED
     assert "/199 " in claim.measured
     assert "left out: 1." in claim.reason
-    runs = StudyRuns(rest)
-    rigid, compliant = (runs.of_participants(Task.COLLABORATIVE, b) for b in Behaviour)
+    rigid, compliant = (StudyRuns(rest).of_participants(Task.COLLABORATIVE, b) for b in Behaviour)
     assert [a for a, _ in paired(rigid, compliant)] == [bool(row["success"]) for row in rigid]
 
 
@@ -157,19 +138,17 @@ def test_one_participant_alone_does_not_show_that_the_rigid_robot_is_better():
     """All that differs is one person's twenty trials: twenty independent ones would reject."""
     worst = participants()[3]
 
-    def of_one(given: Mapping[str, str], k: int) -> bool:  # noqa: ARG001
+    def of_one(given: Mapping[str, str], _k: int) -> bool:
         return given["behaviour"] == "compliant" and all(given.get(n) == x for n, x in worst.items())
 
-    claim = verdicts(table_of(of_one))["The rigid robot succeeds more often (H2): collaborative"]
+    claim = verdicts(table_of(of_one))[H2]
     assert claim.verdict is Verdict.NOT_REPRODUCED
     assert "p = 1;" in claim.reason
 
 
 def test_trials_that_did_not_come_to_their_end_are_failures():
-    rows = table_of(never).rows
-    for row in rows[:20]:
-        row |= {"status": "failed", "success": None, "decided_by": None}
-    claims = verdicts(CampaignTable(pa.Table.from_pylist(rows)))
-    claim = claims["Handovers that succeed: robot to human, rigid"]
+    failed = {"status": "failed", "success": None, "decided_by": None}
+    rows = [row | {"success": True} | (failed if k < 20 else {}) for k, row in enumerate(table_of().rows)]
+    claim = verdicts(made_table(rows))["Handovers that succeed: robot to human, rigid"]
     assert claim.measured == "180/200 (90 %)"
     assert "20 of 200 runs did not come to their end" in claim.reason

@@ -5,7 +5,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from support.made_tables import empty, made_table, one
+from support.scenarios.made_tables import empty, made_table, one
 from support.wording import Wording
 
 from handover.controllers.ir_grasp.ir_reflex import IrReflex

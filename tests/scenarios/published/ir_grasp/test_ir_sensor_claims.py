@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 import pytest
-from support.made_tables import empty, made_table, one
+from support.scenarios.made_tables import empty, made_table, one
 
 from handover.scenarios.campaign.plan import PlannedRun
 from handover.scenarios.campaign.table import CampaignTable

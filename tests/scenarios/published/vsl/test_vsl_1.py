@@ -6,18 +6,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 import pytest
+from support.scenarios.made_tables import made_table, text_of
+from support.wording import Wording
 
 from handover.controllers.vsl.paths import Path as TipPath
-from handover.scenarios.campaign.plan_check import checked_plan
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.published.published_experiment import Claim, Verdict
 from handover.scenarios.published.vsl.separation import MIN_RUNS, Comparison, p_value_of_separation, separation_claim
 from handover.scenarios.published.vsl.vsl_1.experiment import Vsl1
 from handover.scenarios.published.vsl.vsl_1.runs import RIGID, SOFT, Cell, Vsl1Runs
-
-Error = Callable[[Mapping[str, str]], float]
 
 
 def usual(given: Mapping[str, str]) -> float:
@@ -28,18 +26,18 @@ def usual(given: Mapping[str, str]) -> float:
 
 
 def table_of(
-    error: Error = usual, quick: bool = False, far: float = 2.0, status: str = "done", path_time: float | None = 8.0
+    error: Callable[[Mapping[str, str]], float] = usual, quick: bool = False, far: float = 2.0, **same: Any
 ) -> CampaignTable:
     """Return the plan's runs with made-up errors, 0.01 mm apart; far from the base `far` times those near."""
     rows: list[dict[str, Any]] = []
     for run in Vsl1().plan(quick).runs():
         given, size = run.parameters, error(run.parameters) + 1e-5 * run.repetition
-        row: dict[str, Any] = {"run": run.name, "status": status, "path": given["path"], "links": given["links"]}
+        row: dict[str, Any] = {"run": run.name, "status": "done", "path": given["path"], "links": given["links"]}
         row |= {"load": float(given["load"]), "pressure": float(given["pressure"]) if "pressure" in given else None}
         spread = given["path"] != "linear"
         row |= {"error_near": size if spread else None, "error_far": far * size if spread else None}
-        rows.append(row | {"mean_error": size, "servo_error": 0.001, "path_time": path_time})
-    return CampaignTable(pa.Table.from_pylist(rows))
+        rows.append(row | {"mean_error": size, "servo_error": 0.001, "path_time": 8.0} | same)
+    return made_table(rows)
 
 
 def claims_of(table: CampaignTable) -> dict[str, Claim]:
@@ -48,12 +46,6 @@ def claims_of(table: CampaignTable) -> dict[str, Claim]:
 
 SOFT_LOAD = "On soft links the tip's error grows with the load."
 PRESSURE = "The lower the pressure, the larger the tip's error."
-
-
-def test_the_plan_has_every_panel_and_plot_of_figure_5_five_times():
-    plan = checked_plan(Vsl1().plan(quick=False))
-    assert (len(plan.points), plan.size) == (3 * 5 * 5, 375)
-    assert Vsl1().plan(quick=True).size == 3 * 2 * 3
 
 
 def test_a_claim_is_judged_in_every_cell():
@@ -68,32 +60,31 @@ def test_a_claim_is_judged_in_every_cell():
         odd = given == Cell(TipPath.SQUARE, 0.05, SOFT[1]).parameters
         return usual(given) - (0.01 if odd else 0.0)
 
-    broken = claims_of(table_of(one_cell))[SOFT_LOAD]
-    assert broken.measured.startswith("47 of 48")
-    assert re.search(r"It fails at: square, 1 bar, 25 g to 50 g \(-\d+\.\d\d mm\)\.", broken.reason)
+    broken = claims_of(table_of(one_cell, far=0.5))
+    assert broken[SOFT_LOAD].measured.startswith("47 of 48")
+    assert re.search(r"It fails at: square, 1 bar, 25 g to 50 g \(-\d+\.\d\d mm\)\.", broken[SOFT_LOAD].reason)
+    assert broken["on the curve, too."].verdict is Verdict.NOT_REPRODUCED
+    assert broken["on the square."].verdict is Verdict.NOT_COMPARABLE
 
 
-def test_what_the_arm_was_made_for_is_not_comparable_and_still_counted():
+def test_what_the_arm_was_made_for_is_not_comparable_and_still_counted(wording: Wording):
     claims = claims_of(table_of())
     without = [c for c in claims.values() if c.verdict is Verdict.NOT_COMPARABLE]
-    assert {c.claim for c in without} == {
-        SOFT_LOAD,
-        "On rigid links it does, too: the arm yields a little.",
-        PRESSURE,
-        "On soft links the tip errs more than on rigid ones.",
-        "The farther the tip is from the base, the larger its error: on the square.",
-        "The path by the servos' encoders is similar to the desired one: nearer than the rigid arm's tip.",
-    }
+    wording.check("\n".join(c.claim for c in without))
     assert all("so agreement proves nothing" in c.reason for c in without)
     assert claims[PRESSURE].measured.startswith("45 of 45")
     stiff = claims_of(table_of(lambda given: 0.02 + 0.1 * float(given["load"])))
     assert stiff[PRESSURE].measured.startswith("0 of 45")
 
 
-def test_a_nearer_tip_that_errs_more_breaks_the_claim_on_reach():
-    broken = claims_of(table_of(far=0.5))
-    assert broken["on the curve, too."].verdict is Verdict.NOT_REPRODUCED
-    assert broken["on the square."].verdict is Verdict.NOT_COMPARABLE
+@pytest.mark.parametrize("same", [{"status": "failed"}, {"path_time": None}])
+def test_without_any_run_that_completed_the_path_there_are_no_verdicts_and_no_failure(
+    same: Mapping[str, Any], tmp_path: Path
+):
+    table = table_of(**same)
+    assert {c.verdict for c in Vsl1().claims(table)} == {Verdict.NOT_COMPARABLE}
+    assert "375 runs did not complete the path" in Vsl1().tables(table)[0].note
+    assert not Vsl1().draw(table, tmp_path, tmp_path)
 
 
 def test_of_the_quick_plan_nothing_is_concluded():
@@ -102,39 +93,17 @@ def test_of_the_quick_plan_nothing_is_concluded():
     assert "it takes 4" in claims[0].reason
 
 
-@pytest.mark.parametrize(
-    "table", [table_of(status="failed"), table_of(path_time=None)], ids=["failed", "path not completed"]
-)
-def test_without_any_run_that_ended_there_are_no_verdicts_and_no_failure(table: CampaignTable, tmp_path: Path):
-    assert {c.verdict for c in Vsl1().claims(table)} == {Verdict.NOT_COMPARABLE}
-    assert "375 runs did not complete the path" in Vsl1().tables(table)[0].note
-    assert not Vsl1().draw(table, tmp_path, tmp_path)
-
-
-def test_tables_have_a_cell_for_each_of_the_figures():
+def test_tables_have_a_cell_for_each_of_the_figures(wording: Wording):
     linear, curve, square, reach = Vsl1().tables(table_of())
-    assert linear.header == ["load", "servos", "rigid", "0.5 bar", "1 bar", "1.5 bar", "2 bar"]
-    assert [cell.replace("\u00a0", " ") for cell in linear.rows[0]] == [
-        "0 g",
-        "1.0 ± 0.00",
-        "4.0 ± 0.02",
-        "20.0 ± 0.02",
-        "13.4 ± 0.02",
-        "10.0 ± 0.02",
-        "8.0 ± 0.02",
-    ]
     assert [len(t.rows) for t in (linear, curve, square, reach)] == [5, 5, 5, 10]
+    wording.check(text_of([linear]))
     assert reach.rows[0][:2] == ["square, 0 g", "4.0 to 8.0"]
 
 
 def test_a_cells_runs_are_its_own():
     runs = Vsl1Runs(table_of())
-    cells = [
-        Cell(path, load, links)
-        for path in (TipPath.CURVE, TipPath.SQUARE)
-        for load in runs.loads
-        for links in (RIGID, *SOFT)
-    ]
+    paths = (TipPath.CURVE, TipPath.SQUARE)
+    cells = [Cell(path, load, links) for path in paths for load in runs.loads for links in (RIGID, *SOFT)]
     names = [name for cell in cells for name in runs.names(cell)]
     assert len(set(names)) == len(names) == 2 * 5 * 5 * 5
 

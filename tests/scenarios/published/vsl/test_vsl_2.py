@@ -4,10 +4,11 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-import pyarrow as pa
 import pytest
+from support.scenarios.made_tables import made_table
+from support.sketched_figures import Sketches
+from support.sketched_figures import sketches as sketches
 
-from handover.scenarios.campaign.plan_check import checked_plan
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.published.published_experiment import Claim, Verdict
 from handover.scenarios.published.vsl.vsl_2.experiment import Vsl2
@@ -21,7 +22,6 @@ from handover.scenarios.published.vsl.vsl_2.runs import (
     OTHERS,
     PUBLISHED,
     RIGIDS,
-    SHIPPED,
     Vsl2Runs,
 )
 from handover.scenarios.vsl.parameters import HybridParameters
@@ -39,36 +39,23 @@ def usual(given: Given) -> float:
 
 
 def table_of(
-    error: Callable[[Given], float] = usual,
-    quick: bool = False,
-    estimate: float = 0.001,
-    network: bool = True,
-    status: str = "done",
-    path_time: float | None = 8.0,
+    error: Callable[[Given], float] = usual, quick: bool = False, network: bool = True, **same: Any
 ) -> CampaignTable:
     """Return the plan's runs with made-up errors, 0.01 mm apart; with a network, those of the small one once more."""
     default, rows = HybridParameters(), list[dict[str, Any]]()
+    usual = {"status": "done", "path_time": 8.0, "model_error": 0.02, "estimate_error": 0.001}
+    usual |= {"outside": 0.0, "model_mismatch": 0.5} | same
     planned = [(run, run.parameters) for run in Vsl2().plan(quick).runs()]
     small = [(run, {**given, "learned": "published"}) for run, given in planned if given.get("learned") == "small"]
     for run, given in [*planned, *(small if network else ())]:
-        size = error(given) + 1e-5 * run.repetition
-        row: dict[str, Any] = {"run": run.name, "status": status, "learned": given.get("learned", "cubic")}
+        row: dict[str, Any] = {"run": run.name, "learned": given.get("learned", "cubic")} | usual
         row |= {"links": given.get("links", "vsl"), "kinematics.method": given.get("kinematics.method", "")}
         row |= {n: float(given[n] if n in given else getattr(default, n)) for n in (*NUMBERS, "load", "pressure")}
         row |= {"closed_loop": given.get("closed_loop") == "true", "imu": given.get("imu", "none")}
         row["arm_seed"] = int(given.get("arm_seed", default.arm_seed))
-        row |= dict.fromkeys(("mean_error", "median_error", "error_p25", "error_p75", "max_error"), size)
-        rows.append(
-            row
-            | {
-                "path_time": path_time,
-                "model_error": 0.02,
-                "estimate_error": estimate,
-                "outside": 0.0,
-                "model_mismatch": 0.5,
-            }
-        )
-    return CampaignTable(pa.Table.from_pylist(rows))
+        errors = ("mean_error", "median_error", "error_p25", "error_p75", "max_error")
+        rows.append(row | dict.fromkeys(errors, error(given) + 1e-5 * run.repetition))
+    return made_table(rows)
 
 
 def claims_of(table: CampaignTable) -> dict[str, Claim]:
@@ -85,29 +72,11 @@ AGAINST_RIGID = "With the hybrid inverse model the soft arm's tip errs less than
 STIFFER = "By {} the soft arm's tip errs less than that of a rigid arm with joints {:g} times as stiff as assumed."
 
 
-def test_the_plan_has_both_cases_in_every_way_and_on_every_arm_five_times():
-    plan = checked_plan(Vsl2().plan(quick=False))
-    methods = 1 + len(SHIPPED) + len(FEEDBACK)
-    assert plan.size == 5 * len(CASES) * (methods + len(JOINT_FACTORS) + methods * len(OTHERS))
-    assert Vsl2().plan(quick=True).size == 12
-
-
 def test_each_run_is_of_one_way_on_one_arm():
     table = table_of()
-    runs = Vsl2Runs(table)
-    trained = [
-        name
-        for case in CASES
-        for method in (MODEL_BASED, *LEARNED, *FEEDBACK, *RIGIDS)
-        for name in runs.names(case, method)
-    ]
-    others = [
-        n
-        for case in CASES
-        for arm in OTHERS
-        for method in (MODEL_BASED, *LEARNED, *FEEDBACK)
-        for n in runs.names(case, method, arm)
-    ]
+    runs, ways = Vsl2Runs(table), (MODEL_BASED, *LEARNED, *FEEDBACK)
+    trained = [name for case in CASES for method in (*ways, *RIGIDS) for name in runs.names(case, method)]
+    others = [n for case in CASES for arm in OTHERS for method in ways for n in runs.names(case, method, arm)]
     assert len(trained + others) == len(table)
     assert len(set(trained + others)) == Vsl2().plan(quick=False).size
 
@@ -117,7 +86,7 @@ def test_claims_are_judged_both_ways():
     judged = (BY_POLYNOMIALS, BY_NETWORK, COMMAND)
     assert [good[name].beyond for name in judged] == [True, False, False]
     assert {good[name].verdict for name in judged} == {Verdict.REPRODUCED}
-    bad = claims_of(table_of(lambda _given: 0.03, estimate=0.03))
+    bad = claims_of(table_of(lambda _given: 0.03, estimate_error=0.03))
     assert {bad[name].verdict for name in judged} == {Verdict.NOT_REPRODUCED}
 
 
@@ -162,22 +131,18 @@ def test_errors_on_other_arms_stand_apart():
     assert broken[on.format("cubic polynomials")].verdict is Verdict.REPRODUCED
 
 
-def test_of_the_quick_plan_nothing_is_concluded():
-    claims = Vsl2().claims(table_of(quick=True))
-    assert {c.verdict for c in claims} == {Verdict.NOT_COMPARABLE}
-
-
-@pytest.mark.parametrize(
-    "table", [table_of(status="failed"), table_of(path_time=None)], ids=["failed", "path not completed"]
-)
-def test_without_any_run_that_ended_there_are_no_verdicts_and_no_failure(table: CampaignTable, tmp_path: Path):
+@pytest.mark.parametrize("same", [{"status": "failed"}, {"path_time": None}])
+def test_without_any_run_that_completed_the_path_there_are_no_verdicts_and_no_failure(
+    same: Mapping[str, Any], tmp_path: Path
+):
+    table = table_of(**same)
     assert {c.verdict for c in Vsl2().claims(table)} == {Verdict.NOT_COMPARABLE}
     assert not Vsl2().tables(table)
     assert not Vsl2().draw(table, tmp_path, tmp_path)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("quick", [False, True])
-def test_figures_that_need_no_records_are_drawn_of_the_table(quick: bool, tmp_path: Path):
-    names = [figure.name for figure in Vsl2().draw(table_of(quick=quick), tmp_path, tmp_path)]
-    assert names == ["rigid_joints", "other_arms"]
+def test_of_the_quick_plan_nothing_is_concluded_and_its_figures_need_no_records(tmp_path: Path, sketches: Sketches):
+    table = table_of(quick=True)
+    assert {c.verdict for c in Vsl2().claims(table)} == {Verdict.NOT_COMPARABLE}
+    Vsl2().draw(table, tmp_path, tmp_path)
+    sketches.check("rigid_joints", "other_arms")
