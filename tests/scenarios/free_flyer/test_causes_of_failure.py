@@ -15,12 +15,11 @@ from handover.scenarios.free_flyer.handover.handovers import (
 )
 from handover.scenarios.free_flyer.handover.person_evaluation import Cause
 
-NOBODY, SLIPPERY = "person.motion=none", "person.grip_force_max=0.01"
+NOBODY = "person.motion=none"
 ASIDE = ("sight_error=0.1", "depth_error=0", "patience=20")
 UNGATED = (NOBODY, "gated=false", "decision.gate_error=0.2")
 PUSHES_AGAIN = ("person.motion_again=push",)
 ONE_ATTEMPT = ("skill=0", "verify=true", "decision.attempts=1")
-ALWAYS_MOVING = ("navigation.velocity_bias=0.004", "patience=30")
 
 
 @dataclass(frozen=True)
@@ -36,32 +35,22 @@ class Staged:
 
 STAGED = (
     Staged(Cause.NOT_FETCHED, "found nothing in it: the object was 150 mm from its fingers", ("model_arm_factor=1.5",)),
-    Staged(Cause.OUT_OF_REACH, "came no nearer than", ("patience=3",), HumanToRobot),
     Staged(Cause.MISSED_BY_HAND, "the last of 3 times", ASIDE, seed=1),
     Staged(Cause.PUSHED_BESIDE, "the push went past the gripper", ASIDE, HumanToRobot, seed=1),
-    Staged(Cause.NOT_FELT, "stayed below the threshold", ("strength=0.2", "patience=20")),
     Staged(Cause.NOT_TRIED, "the person did not pull", (NOBODY, "patience=20")),
     Staged(Cause.BUMPED, "which bumped the object", ("skill=0",)),
     Staged(Cause.RELEASED_UNHELD, "nobody had pulled, but it saw its gripper move at", UNGATED),
     Staged(Cause.LET_GO_EARLY, "before the fingers closed", ("person.haste=1",), HumanToRobot),
     Staged(Cause.RECEPTIONS_FAILED, "gave up after 5 failed receptions", PUSHES_AGAIN, FailedReception),
-    Staged(Cause.SLIPPED, "was lost at", (SLIPPERY, "person.object_mass=2", "person.centring_time=100")),
-    Staged(Cause.TORN_OUT, "torn out of the closed gripper", (SLIPPERY,)),
+    Staged(Cause.TORN_OUT, "torn out of the closed gripper", ("person.grip_force_max=0.01",)),
     Staged(Cause.DELIVERIES_FAILED, "still held what it had released", ONE_ATTEMPT, seed=9),
-    Staged(Cause.NOT_SETTLED, "never at rest and aligned there", ("navigation.velocity_bias=0.016", "patience=20")),
-    Staged(Cause.NOT_RETREATED, "but then the robot gave up in phase RETREAT", ALWAYS_MOVING, HumanToRobot),
-    Staged(Cause.OTHER, "0 failed receptions where 1 was staged", ("person.motion=give",), FailedReception),
 )
-CHEAP = (Cause.NOT_FETCHED, Cause.OUT_OF_REACH)
-"""What ends soon; the other runs cost some 2 s each."""
+"""Other causes are told by staged signals, see test_handover_evaluation.py."""
 
 
 @pytest.mark.parametrize(
     "staged",
-    [
-        pytest.param(staged, id=staged.cause.name.lower(), marks=[] if staged.cause in CHEAP else pytest.mark.slow)
-        for staged in STAGED
-    ],
+    [pytest.param(s, id=s.cause.name.lower(), marks=pytest.mark.slow if k else ()) for k, s in enumerate(STAGED)],
 )
 def test_the_verdict_names_what_was_staged_to_go_wrong(tmp_path: Path, staged: Staged):
     ended = run(staged.scenario, tmp_path / "r", *staged.parameters, seed=staged.seed)
@@ -70,8 +59,7 @@ def test_the_verdict_names_what_was_staged_to_go_wrong(tmp_path: Path, staged: S
     assert not ended.outcome.success
 
 
-def test_every_cause_is_staged():
-    assert {staged.cause for staged in STAGED} | {Cause.NONE, Cause.OUT_OF_TIME} == set(Cause)
+"""What ends soon; the other runs cost some 2 s each."""
 
 
 @pytest.mark.slow

@@ -11,7 +11,7 @@ from support.sketched_figures import Sketches
 from support.sketched_figures import sketches as sketches
 
 from handover.cosim.blocks.ports import Floats
-from handover.scenarios.free_flyer.scene import Solid, draw_near, draw_scene
+from handover.scenarios.free_flyer.scene import Solid, draw_scene
 
 CUBE: Floats = np.array([[x, y, z] for x in (0.0, 0.3) for y in (0.0, 0.3) for z in (0.0, 0.3)])
 GREY, BLUE = "#c9d3df", "#2f6db5"
@@ -50,16 +50,3 @@ def test_from_the_side_what_is_nearer_hides_what_is_behind_it(tmp_path: Path, sk
     assert colours[0][0] > colours[1][0]  # the blue one, of less red, is drawn over the grey one
     apart, _ = faces(from_above)
     assert abs(apart[0].mean(axis=0) - apart[1].mean(axis=0))[1] == pytest.approx(0.5)
-
-
-def test_a_transfer_is_shown_from_near_around_its_middle(tmp_path: Path, sketches: Sketches):
-    middle = np.array([0.1, -0.2, 0.3])
-    draw_near({"5.0 s, transfer": NEAR}, {"5.0 s, transfer": middle}, tmp_path)
-    (figure,) = sketches.values()
-    drawn = figure.axes
-    titles = [axes.get_title() for axes in drawn]
-    assert titles == ["5.0 s, transfer, from the side", "5.0 s, transfer, from above"]
-    for axes, up in zip(drawn, (middle[2], middle[1]), strict=True):
-        assert np.mean(axes.get_xlim()) == pytest.approx(middle[0])
-        assert np.mean(axes.get_ylim()) == pytest.approx(up)
-        assert span(axes.get_xlim()) == pytest.approx(0.4)

@@ -3,7 +3,6 @@
 import json
 from pathlib import Path
 
-import numpy as np
 import pytest
 from click.testing import CliRunner
 from scipy import stats
@@ -23,17 +22,16 @@ def test_the_t_test_agrees_with_the_noncentral_distribution(people: int, exact: 
     assert float(stats.nct.sf(c, people - 1, 0.8 * people**0.5)) == pytest.approx(exact, abs=1e-3)
     found = simulated_power(PLAN, people, PowerAssumptions(effect=0.8, spread=30.0, repeats=1000))
     assert found.t_test.low < exact < found.t_test.high
-    assert found.single_uncorrected.estimate == pytest.approx(
-        exact - 0.018, abs=0.03
-    )  # ranks lose some 5 % of the efficiency
+    assert found.single_uncorrected.estimate == pytest.approx(exact - 0.018, abs=0.03)  # ranks lose some 5 %
 
 
-def test_of_one_participant_nothing_can_be_found(tmp_path: Path):
-    plan = tmp_path / "plan.toml"
-    plan.write_text(default_plan().replace("participants = 18", "participants = 1"), encoding="utf-8")
-    refused = CliRunner().invoke(main, ["study", "power", str(plan)])
-    assert refused.exit_code == 2
-    assert "of 1 participant nothing can be found; --participants 10,12,18 tries others" in refused.output
+@pytest.mark.parametrize(("people", "status"), [("8,12", 0), ("ten", 2), ("1", 2)])
+def test_the_command_says_what_was_assumed_or_is_wrong(people: str, status: int, tmp_path: Path, wording: Wording):
+    (tmp_path / "plan.toml").write_text(default_plan(), encoding="utf-8")
+    arguments = ["study", "power", str(tmp_path / "plan.toml"), "--participants", people, "--repeat", "100"]
+    shown = CliRunner().invoke(main, arguments)
+    assert shown.exit_code == status, shown.output
+    wording.check(shown.output)
 
 
 def test_ten_find_an_effect_of_08_in_one_half_and_eighteen_in_nine_tenths():
@@ -51,13 +49,6 @@ def test_without_an_effect_something_is_found_in_five_of_hundred_at_most():
     assert found.any_of_all_holm.estimate == pytest.approx(found.familywise_error.estimate)
 
 
-def test_more_people_and_larger_effects_find_more():
-    by_people = [simulated_power(PLAN, n, PowerAssumptions(effect=0.8, repeats=300)) for n in (10, 14, 18)]
-    assert np.all(np.diff([p.one_effect_holm.estimate for p in by_people]) > 0.0)
-    larger = simulated_power(PLAN, 10, PowerAssumptions(effect=1.5, repeats=300))
-    assert larger.one_effect_holm.estimate > 2 * by_people[0].one_effect_holm.estimate
-
-
 def test_too_few_find_nothing_after_holm():
     assert fewest_participants(9) == 9
     assert fewest_participants(1) == 6
@@ -70,23 +61,8 @@ def test_too_few_find_nothing_after_holm():
 def test_what_all_studies_find_is_100_percent_with_its_interval(tmp_path: Path):
     (tmp_path / "plan.toml").write_text(default_plan(), encoding="utf-8")
     arguments = ["study", "power", str(tmp_path / "plan.toml"), "--participants", "12", "--repeat", "100"]
-    shown = CliRunner().invoke(main, [*arguments, "--effect", "9"])
-    assert "100% (96-100)" in shown.output
     data = json.loads(CliRunner().invoke(main, [*arguments, "--effect", "9", "--json"]).output)["power"][0]
-    assert set(data) >= {"single_uncorrected", "one_effect_holm", "each_of_all_holm", "any_of_all_holm"}
-    found = data["single_uncorrected"]
+    found, error = data["single_uncorrected"], data["familywise_error"]
     assert (found["estimate"], found["successes"], found["repeats"], found["high"]) == (1.0, 100, 100, 1.0)
     assert found["low"] == pytest.approx(0.0250 ** (1 / 100), abs=1e-6)
-    error = data["familywise_error"]
     assert error["estimate"] == error["successes"] / 100
-
-
-def test_the_command_says_what_was_assumed(tmp_path: Path, wording: Wording):
-    (tmp_path / "plan.toml").write_text(default_plan(), encoding="utf-8")
-    arguments = ["study", "power", str(tmp_path / "plan.toml"), "--participants"]
-    shown = CliRunner().invoke(main, [*arguments, "8,12", "--repeat", "100"])
-    assert shown.exit_code == 0, shown.output
-    wording.check(shown.output)
-    refused = CliRunner().invoke(main, [*arguments, "ten"])
-    assert refused.exit_code == 2
-    wording.check(refused.output)

@@ -4,6 +4,7 @@ import json
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -13,10 +14,11 @@ import pyarrow.parquet as pq
 import pytest
 from support.kept_runs import kept_run
 from support.processes import with_path
-from support.scenarios.sample_study import PILOT_PLAN, PLAN, play, read_by_codebook, record, same, session, write_study
+from support.scenarios.sample_study import PLAN, read_by_codebook, record, same, session, write_study
+from support.wording import Wording
 
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
-from handover.scenarios.study.folder.codebook import PILOT, questionnaire_columns, write_csv
+from handover.scenarios.study.folder.codebook import questionnaire_columns, write_csv
 from handover.scenarios.study.folder.session_folder import SessionFolder
 from handover.scenarios.study.folder.study_folder import StudyFolder
 from handover.scenarios.study.plan.order import rounds_of
@@ -56,7 +58,7 @@ def test_what_a_person_typed_is_no_formula_of_a_spreadsheet(tmp_path: Path, type
     assert written["age_group"][0] == "-20"
 
 
-def test_the_codebook_tells_every_column_with_its_unit(tmp_path: Path):
+def test_codebook_and_parquet_tell_every_column_with_its_unit(tmp_path: Path):
     study = write_study(tmp_path / "out", 1, same)
     codebook = csv_of(study.path / "codebook.csv", keep_default_na=False).set_index(["table", "column"])
     assert codebook.loc[("rounds", "latency_p95_ms"), "unit"] == "ms"
@@ -65,12 +67,8 @@ def test_the_codebook_tells_every_column_with_its_unit(tmp_path: Path):
     assert set(codebook[codebook["type"].isin(["whole number", "number"])]["unit"]) == {"1", "ms"}
     in_words = (study.path / "codebook.md").read_text(encoding="utf-8")
     assert all(f"| `{column}` |" in in_words for _, column in codebook.index)
-
-
-def test_parquet_has_the_same_rows_with_units(tmp_path: Path):
-    folder = write_study(tmp_path / "out", 1, same).session(1)
-    table = pq.read_table(folder.path / "rounds.parquet")
-    rounds = read_by_codebook(tmp_path / "out", "rounds", folder.path / "rounds.csv")
+    folder = study.session(1).path
+    table, rounds = pq.read_table(folder / "rounds.parquet"), csv_of(folder / "rounds.csv")
     assert table.num_rows == 12
     for name in ("round", "seed", "latency_p95_ms", "success", "task"):
         assert table.column(name).to_pylist() == rounds[name].to_list()
@@ -88,24 +86,25 @@ def test_a_round_over_the_limit_is_marked_and_one_that_was_not_measured_is_neith
     assert rounds["missed_deadlines"].isna()[2]
 
 
-def test_rounds_come_in_turn_and_want_ratings_unless_void(tmp_path: Path):
+def test_rounds_come_in_turn_and_want_ratings_unless_void(tmp_path: Path, wording: Wording):
     folder = StudyFolder.opened(tmp_path / "out", PLAN).begin(session(3))
     assert folder.next_round == rounds_of(PLAN, 3)[0]
-    with pytest.raises(ValueError, match="round 2 cannot be kept: 1 is the next one"):
-        folder.record_round(2, record())
+
+    def refused(act: Callable[[], object]) -> None:
+        with pytest.raises(ValueError) as e:  # noqa: PT011
+            act()
+        wording.check(e.value)
+
+    refused(lambda: folder.record_round(2, record()))
     folder.record_round(1, record(void=True))
     assert folder.unrated_round is None
     folder.record_round(2, record())
     assert folder.unrated_round == rounds_of(PLAN, 3)[1]
-    with pytest.raises(
-        ValueError, match="S2 is not rated; there is no statement S4; S1 = 10: a whole number from 1 to 9"
-    ):
-        folder.record_answers(2, {"S1": 10, "S3": 1, "S4": 2})
+    refused(lambda: folder.record_answers(2, {"S1": 10, "S3": 1, "S4": 2}))
     folder.record_answers(2, {"S1": 9, "S2": 1, "S3": 5})
     assert folder.unrated_round is None
     assert folder.answers == {2: {"S1": 9, "S2": 1, "S3": 5}}
-    with pytest.raises(ValueError, match="age_group = '200': 18-20, 21-30"):
-        folder.record_questionnaire({"age_group": "200"})
+    refused(lambda: folder.record_questionnaire({"age_group": "200"}))
     assert not folder.is_complete
 
 
@@ -144,89 +143,80 @@ def test_a_run_that_was_killed_is_put_aside_and_one_that_ended_is_not(tmp_path: 
     folder = StudyFolder.opened(tmp_path / "out", PLAN).begin(session(1))
     for _ in range(2):
         folder.run_folder(1).mkdir()
-        (folder.run_folder(1) / "run.json").write_text("{}")
         assert folder.clear_unfinished(1) is not None
     assert not folder.run_folder(1).exists()
-    assert (folder.path / "rounds" / "01_unfinished_2" / "run.json").is_file()
+    assert (folder.path / "rounds" / "01_unfinished_2").is_dir()
     folder.run_folder(1).mkdir()
     folder.record_round(1, record())
     assert folder.clear_unfinished(1) is None
     assert folder.run_folder(1).exists()
 
 
-def test_who_may_not_take_part_leaves_nothing(tmp_path: Path):
+def test_who_may_not_take_part_leaves_nothing(tmp_path: Path, wording: Wording):
     study = StudyFolder.opened(tmp_path / "out", PLAN)
-    with pytest.raises(InvalidRunFolder, match=r"not agreed to take part; .*not confirmed all.*no device 'script'"):
-        study.begin(replace(session(1), consent=False, eligibility=[True, False, True], device="script"))
-    with pytest.raises(InvalidRunFolder, match="do not mix in one study"):
-        study.begin(replace(session(1), pilot=True))
+    may_not = {"consent": False, "eligibility": [True, False, True], "device": "script"}
+    for changed in (may_not, {"pilot": True}):
+        with pytest.raises(InvalidRunFolder) as refused:
+            study.begin(replace(session(1), **changed))
+        wording.check(refused.value)
     assert study.numbers == []
     assert not list(study.participants.iterdir())
 
 
-def test_a_folder_of_another_plan_or_of_something_else_is_refused(tmp_path: Path):
-    StudyFolder.opened(tmp_path / "out", PLAN).begin(session(1))
+def test_a_folder_of_another_plan_or_of_something_else_is_refused(tmp_path: Path, wording: Wording):
+    out = tmp_path / "out"
+    StudyFolder.opened(out, PLAN).begin(session(1))
     other = parse_plan(default_plan().replace("seed = 2020", "seed = 2021"))
-    with pytest.raises(InvalidRunFolder, match="its study has another plan"):
-        StudyFolder.opened(tmp_path / "out", other)
-    with pytest.raises(InvalidRunFolder, match="it is not the folder of a study"):
-        StudyFolder.read(tmp_path)
-    with pytest.raises(InvalidRunFolder, match="it is not empty"):
-        StudyFolder.opened(tmp_path, PLAN)
-    with pytest.raises(InvalidRunFolder, match="a session has begun in it"):
-        StudyFolder.read(tmp_path / "out").begin(session(1))
-    with pytest.raises(InvalidRunFolder, match="no session has begun in it"):
-        StudyFolder.read(tmp_path / "out").session(2)
-    assert StudyFolder.read(tmp_path / "out").next_number == 2
+    wrong: list[Callable[[], object]] = [
+        lambda: StudyFolder.opened(out, other),
+        lambda: StudyFolder.read(tmp_path),
+        lambda: StudyFolder.opened(tmp_path, PLAN),
+        lambda: StudyFolder.read(out).begin(session(1)),
+        lambda: StudyFolder.read(out).session(2),
+    ]
+    for act in wrong:
+        with pytest.raises(InvalidRunFolder) as refused:
+            act()
+        wording.check(refused.value)
+    assert StudyFolder.read(out).next_number == 2
 
 
 @pytest.mark.parametrize("linked", ["participants", "participants/P01", "participants/P01/rounds"])
-def test_sessions_that_lie_elsewhere_are_not_written_to(linked: str, tmp_path: Path):
+def test_sessions_that_lie_elsewhere_are_not_written_to(linked: str, tmp_path: Path, wording: Wording):
     StudyFolder.opened(tmp_path / "out", PLAN).begin(session(1))
     (tmp_path / "out" / linked).rename(tmp_path / "elsewhere")
     (tmp_path / "out" / linked).symlink_to(tmp_path / "elsewhere")
-    with pytest.raises(InvalidRunFolder, match=f"{linked} is a link"):
+    with pytest.raises(InvalidRunFolder) as refused:
         StudyFolder.read(tmp_path / "out")
+    wording.check(refused.value)
 
 
-def test_a_damaged_file_is_told_by_its_name(tmp_path: Path):
+def test_a_damaged_file_is_told_by_its_name(tmp_path: Path, wording: Wording):
     folder = StudyFolder.opened(tmp_path / "out", PLAN).begin(session(1))
     folder.record_round(1, record())
-    (folder.path / "rounds" / "01.json").write_text('{"record": {"success": true}}')
-    with pytest.raises(InvalidRunFolder, match=r"its 01.json is damaged"):
-        _ = folder.records
-    (folder.path / "rounds" / "01.json").write_text(json.dumps({"record": asdict(record()), "answers": {"S1": 2**63}}))
-    with pytest.raises(InvalidRunFolder, match=r"its 01.json is damaged"):
-        folder.write_tables()
-    (folder.path / "session.json").write_text("{")
-    with pytest.raises(InvalidRunFolder, match=r"its session.json is damaged"):
-        SessionFolder.read(folder.path, PLAN)
-
-
-def test_scripted_pilots_are_named_so_in_every_file_of_a_session(tmp_path: Path):
-    study = StudyFolder.opened(tmp_path / "out", PILOT_PLAN)
-    folder = study.begin(session(1, PILOT_PLAN))
-    play(folder, same)
-    for name in ("rounds.csv", "answers.csv", "questionnaire.csv"):
-        lines = csv_of(folder.path / name)
-        assert set(lines["kind"]) == {PILOT}
-    assert json.loads((folder.path / "session.json").read_text())["kind"] == PILOT
-    assert set(pq.read_table(folder.path / "rounds.parquet").column("kind").to_pylist()) == {PILOT}
-    assert "no person took part" in (study.path / "codebook.md").read_text()
+    too_large = json.dumps({"record": asdict(record()), "answers": {"S1": 2**63}})
+    damages: list[tuple[str, str, Callable[[], object]]] = [
+        ("rounds/01.json", '{"record": {"success": true}}', lambda: folder.records),
+        ("rounds/01.json", too_large, folder.write_tables),
+        ("session.json", "{", lambda: SessionFolder.read(folder.path, PLAN)),
+    ]
+    for name, text, read in damages:
+        (folder.path / name).write_text(text)
+        with pytest.raises(InvalidRunFolder) as refused:
+            read()
+        wording.check(refused.value)
 
 
 @pytest.mark.parametrize(
     ("scenario", "given", "failed"),
     [
         pytest.param("flyer_robot_to_human", (), False),
-        pytest.param("flyer_human_to_robot", (), False, marks=pytest.mark.slow),
         pytest.param("flyer_collaborative", (), False, marks=pytest.mark.slow),
-        pytest.param("flyer_robot_to_human", ("-p", "strength=0.1", "-p", "patience=5"), True),
+        pytest.param("flyer_robot_to_human", ("-p", "strength=0.1", "-p", "patience=5"), True, marks=pytest.mark.slow),
         pytest.param("flyer_impedance", (), None),  # its record does not say who held an object
     ],
 )
 def test_the_thesis_rule_by_who_held_the_object(scenario: str, given: tuple[str, ...], failed: bool | None):
     run = RunFolder.of_run(kept_run("run", scenario, *given, "--no-report"))
-    if failed is not None:
-        assert bool(run.read_summary()["success"]) is not failed
+    assert failed is None or bool(run.read_summary()["success"]) is not failed
     assert failed_by_rule(run) is failed

@@ -6,9 +6,9 @@ import re
 from pathlib import Path
 from urllib.request import urlopen
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
-from playwright.sync_api import Page
 from support.opened_page import launched, wait_until
 from support.scenarios import study_server
 from support.scenarios.served_page import at, pilot_plan, served, to_round
@@ -31,10 +31,6 @@ def plan_of_webcam(path: Path, devices: str = '["webcam"]') -> Path:
     return pilot_plan(path, devices=devices, patience=12)
 
 
-def begin(page: Page) -> None:
-    page.get_by_role("button", name="Begin").click()
-
-
 @pytest.mark.slow
 def test_a_hand_before_a_webcam_plays_a_round_whose_files_hashes_are_kept(tmp_path: Path):
     write_video(tmp_path / "camera.y4m")
@@ -50,15 +46,9 @@ def test_a_hand_before_a_webcam_plays_a_round_whose_files_hashes_are_kept(tmp_pa
         page.goto(address)
         to_round(page, device="Webcam")
         wait_until(page, f"{TOLD} === 'The camera sees your hand.'")
-        assert page.locator("#video").is_visible()
-        begin(page)
+        page.get_by_role("button", name="Begin").click()
         at(page, "rating")
         assert page.locator("#video").is_visible()  # it goes on to the next round
-        wait_until(page, "!document.querySelector('.study-rating').disabled")
-        for key in "739":
-            page.keyboard.press(key)
-        page.get_by_role("button", name="Send").click()
-        at(page, "instruction")
         page.get_by_role("button", name="Stop taking part").click()
         page.locator("#sure-yes").click()
         at(page, "withdrawn")
@@ -74,10 +64,8 @@ def test_a_hand_before_a_webcam_plays_a_round_whose_files_hashes_are_kept(tmp_pa
     record = Record(run / "signals.parquet")
     seen = record["person.age"] < 1.0
     assert seen.sum() > 20
-    p = record["person.p_WH_track"][seen]
-    assert (p.max(axis=0) - p.min(axis=0)).max() > 0.1  # the hand in the video goes 0.12 m aside
-    assert record["person.closed_track"][seen].any()
-    assert not record["person.closed_track"][seen].all()
+    assert np.ptp(record["person.p_WH_track"][seen], axis=0).max() > 0.1  # the hand in the video goes 0.12 m aside
+    assert set(record["person.closed_track"][seen].tolist()) == {0, 1}
 
 
 def test_a_webcams_files_are_served_below_the_page_and_nothing_else_of_their_folder(tmp_path: Path):
@@ -95,31 +83,6 @@ def test_a_webcams_files_are_served_below_the_page_and_nothing_else_of_their_fol
         for word in ("const handCamera", "worker-src", 'id="video"'):
             assert word not in text
         assert status(where, "/webcam/worker.js") == 404
-
-
-@pytest.mark.slow
-def test_why_a_camera_cannot_lead_is_told_in_the_language_of_the_participant(tmp_path: Path):
-    folder, plan = write_files(tmp_path / "vision", model=b"broken"), plan_of_webcam(tmp_path / "plan.toml")
-    begins, again = "Die Webcam kann die Hand nicht führen: ", page_words()["de"]["camera_again"]
-    with (
-        launched("--use-fake-ui-for-media-stream") as browser,
-        served(plan, tmp_path / "study", "--webcam", str(folder)) as address,
-        browser.new_page() as page,
-    ):
-        page.goto(address)
-        to_round(page, device="Webcam", language="de")
-        wait_until(page, f"{TOLD} === '{begins}Es ist keine Kamera angeschlossen.'")
-        page.evaluate(
-            "navigator.mediaDevices.getUserMedia = () => Promise.reject(new DOMException('', 'NotAllowedError')); 0"
-        )
-        page.get_by_role("button", name=again).click()
-        wait_until(page, f"{TOLD}.startsWith('{begins}Der Browser durfte die Kamera nicht benutzen. ')")
-        page.evaluate(
-            "navigator.mediaDevices.getUserMedia = async () => document.createElement('canvas').captureStream(); 0"
-        )
-        page.get_by_role("button", name=again).click()
-        wait_until(page, f"{TOLD}.startsWith('{begins}MediaPipe, das eine Hand findet, meldet einen Fehler: ')")
-        assert page.get_by_role("button", name="Beginnen").is_disabled()
 
 
 def test_every_fault_of_a_camera_has_a_text_in_english_and_in_every_other_language():
