@@ -56,6 +56,7 @@ def test_the_robot_gives_an_object_to_a_person():
     assert not np.any(done.record["decision.impedance"] & done.record["decision.pose"])
 
 
+@pytest.mark.slow
 def test_a_person_gives_an_object_to_the_robot():
     done = kept("flyer_human_to_robot", "behaviour=compliant")
     assert done.success, done.reason
@@ -64,6 +65,7 @@ def test_a_person_gives_an_object_to_the_robot():
     assert done.metric("arrival_error") < 0.01
 
 
+@pytest.mark.slow
 def test_a_biased_estimate_leads_the_gripper_astray_and_the_truth_tells(tmp_path: Path):
     stop = kept("flyer_human_to_robot", "behaviour=compliant").metric("phase_signal") + 1.0
     given = "behaviour=compliant", "navigation.position_bias=0.02"
@@ -74,6 +76,7 @@ def test_a_biased_estimate_leads_the_gripper_astray_and_the_truth_tells(tmp_path
     assert metric(biased, "arrival_error") == pytest.approx(float(bias), abs=0.01)
 
 
+@pytest.mark.slow
 def test_a_failed_reception_is_noticed_and_repeated():
     done = kept("flyer_failed_reception")
     assert done.success, done.reason
@@ -112,14 +115,6 @@ def test_a_compliant_robot_gives_way_further_where_the_thrusters_can_tell_it_fro
     assert metric(runs[1], "transfer_speed") > 0.08
 
 
-@pytest.mark.slow
-def test_a_stronger_person_moves_the_robot_farther_within_its_thrusters_limits(tmp_path: Path):
-    assert HandoverParameters().strength == 4.0
-    weak, strong = run(RobotToHuman, tmp_path / "r", "strength=1"), kept("flyer_robot_to_human")
-    assert weak.outcome.success, weak.outcome.reason
-    assert strong.metric("transfer_displacement") > 1.5 * metric(weak, "transfer_displacement") > 0.06
-
-
 @pytest.mark.parametrize("place", ["50,-0.07,0", "0.9,0.9,0.9"])
 def test_a_place_out_of_reach_is_refused_before_anything_is_written(tmp_path: Path, place: str, wording: Wording):
     with pytest.raises(InvalidParameter) as refused:
@@ -129,14 +124,9 @@ def test_a_place_out_of_reach_is_refused_before_anything_is_written(tmp_path: Pa
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("scenario", "behaviour", "place"),
-    [(RobotToHuman, "compliant", "0.2,-0.2,0.15"), (HumanToRobot, "rigid", "-0.2,0.1,-0.2")],
-)
-def test_another_place_and_the_other_behaviour_are_as_good(
-    tmp_path: Path, scenario: type[FlyerHandover], behaviour: str, place: str
-):
-    ended = run(scenario, tmp_path / "r", f"p_WG_handover={place}", f"behaviour={behaviour}", seed=2)
+def test_another_place_and_the_other_behaviour_are_as_good(tmp_path: Path):
+    given = "p_WG_handover=0.2,-0.2,0.15", "behaviour=compliant"
+    ended = run(RobotToHuman, tmp_path / "r", *given, seed=2)
     assert ended.outcome.success, ended.outcome.reason
 
 

@@ -63,10 +63,3 @@ def test_a_delivery_that_failed_by_a_persons_bump_is_noticed_and_made_good(tmp_p
     ended = run(RobotToHuman, tmp_path / "r", "skill=0", "verify=true", seed=9)
     assert ended.outcome.success, ended.outcome.reason
     assert metric(ended, "failed_deliveries") == 1
-
-
-@pytest.mark.slow
-def test_a_skilled_person_who_pulls_weakly_is_not_disturbed_by_a_robot_that_looks(tmp_path: Path):
-    ended = run(RobotToHuman, tmp_path / "r", "strength=1", "verify=true")
-    assert ended.outcome.success, ended.outcome.reason
-    assert metric(ended, "failed_deliveries") == metric(ended, "disturbed_deliveries") == 0

@@ -77,17 +77,9 @@ def test_on_windows_serving_is_refused_in_a_line(tmp_path: Path, monkeypatch: py
     assert not (tmp_path / "study").exists()
 
 
-@pytest.mark.parametrize(
-    ("old", "new"),
-    [
-        pytest.param("seed = 2020", "sed = 1", id="two faults"),
-        pytest.param('"mouse"', '"mose"', id="an unknown device"),
-        pytest.param('"flyer_robot_to_human"', '"flyer_impedance"', id="nobody can lead a hand"),
-    ],
-)
-def test_every_fault_of_a_plan_has_its_line(old: str, new: str, tmp_path: Path, wording: Wording):
+def test_every_fault_of_a_plan_has_its_line(tmp_path: Path, wording: Wording):
     file = tmp_path / "plan.toml"
-    file.write_text(default_plan().replace(old, new), encoding="utf-8")
+    file.write_text(default_plan().replace("seed = 2020", "sed = 1"), encoding="utf-8")
     shown = study("plan", file)
     assert shown.exit_code == 2
     wording.check(shown.output)

@@ -11,10 +11,8 @@ from support.sketched_figures import sketches as sketches
 from support.wording import Wording
 
 from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.free_flyer.parameters import Behaviour, Propulsion, Task
 from handover.scenarios.published.free_flyer.flyer_controllers import (
     DISTURBANCES,
-    ControllerRows,
     FlyerControllers,
 )
 from handover.scenarios.published.free_flyer.variations import names_of
@@ -75,14 +73,6 @@ def test_every_claim_is_judged_both_ways(wording: Wording):
 def test_no_controller_of_the_plan_is_told_of_a_delay_that_it_would_reject():
     for point in FlyerControllers().plan(quick=False).points:
         assert ("delay" in point) == (point.get("impedance.delay") == "0")
-
-
-def test_a_run_is_found_by_what_disturbs_it():
-    rows = ControllerRows(table_of())
-    case = "AdmittanceController", Task.COLLABORATIVE, Behaviour.RIGID, Propulsion.LIMITED
-    for what in DISTURBANCES:
-        assert len(rows.of(*case)) == len(rows.of(*case, what)) == 2
-        assert rows.of(*case) != rows.of(*case, what)
 
 
 def test_a_quick_campaign_has_one_table_and_no_figure(tmp_path: Path):

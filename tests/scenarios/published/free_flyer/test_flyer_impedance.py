@@ -17,7 +17,6 @@ from handover.scenarios.published.free_flyer.flyer_impedance import FlyerImpedan
 from handover.scenarios.published.free_flyer.push_runs import (
     PUSHES,
     Push,
-    PushRuns,
     predicted_errors,
     predicted_greatest,
 )
@@ -90,16 +89,6 @@ def test_a_quick_plan_decides_nothing_on_durations_and_has_no_table_of_them():
 def test_the_figures_are_numbered_as_in_the_thesis():
     numbers = [push.figure_number(behaviour) for behaviour in Behaviour for push in PUSHES]
     assert numbers == [f"fig. 4.{n}" for n in range(5, 17)]
-
-
-def test_a_run_is_found_by_what_it_is_for():
-    runs, push = PushRuns(table_of()), PUSHES[1]
-    for exact, noise in ((False, None), (True, 0.0)):
-        found = runs.of(push, Behaviour.RIGID, exact=exact)
-        assert found is not None
-        assert found["navigation.position_noise"] == noise
-    assert runs.of(push, Behaviour.RIGID, duration=7.0) is None
-    assert len(runs.all_of()) == 12
 
 
 @pytest.mark.parametrize("behaviour", Behaviour)

@@ -14,14 +14,12 @@ from support.sketched_figures import sketches as sketches
 from handover.plants.free_flyer.robot.navigation import Params
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.free_flyer.handover.person_evaluation import Cause
-from handover.scenarios.free_flyer.parameters import Behaviour, Task
 from handover.scenarios.published.free_flyer.flyer_navigation import FlyerNavigation
 from handover.scenarios.published.free_flyer.navigation_runs import (
     DELAY,
     ESTIMATE_ERRORS,
     VARIATIONS,
     VELOCITY_BIAS,
-    NavigationRuns,
     count_probability,
     rest_probability,
 )
@@ -134,14 +132,6 @@ def test_a_transfer_before_a_failed_retreat_is_told_apart():
     (shown,) = FlyerNavigation().tables(made_table(row | retreats for row in table_of(fails=each).rows))
     first = shown.rows[0]
     assert (first[1][:6], first[3], first[-1]) == ("0 of 6", "12 of 12", "not retreated")
-
-
-def test_a_run_is_found_by_its_error():
-    runs = NavigationRuns(table_of())
-    assert len(runs.of(Task.ROBOT_TO_HUMAN, Behaviour.RIGID)) == 3
-    found = runs.all_of(DELAY.variation(0.032))
-    assert len(found) == 12
-    assert {row["navigation.delay"] for row in found} == {0.032}
 
 
 def test_a_bias_below_the_gate_is_as_likely_as_drawn_ones_are():
