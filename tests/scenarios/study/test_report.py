@@ -99,15 +99,13 @@ def test_scripted_pilots_are_told_in_every_section_and_file(tmp_path: Path):
 
 @pytest.mark.slow
 def test_pandas_reads_all_tables_by_their_codebooks(reported: Path):
-    rounds = read_by_codebook(reported, "rounds", reported / "rounds.csv")
-    answers = read_by_codebook(reported, "answers", reported / "answers.csv")
+    """Those of a session: test_session_folder.py."""
     sessions = read_by_codebook(reported, "sessions", reported / "sessions.csv")
-    assert len(read_by_codebook(reported, "questionnaire", reported / "questionnaire.csv")) == 12
-    assert (len(rounds), len(answers), len(sessions)) == (144, 432, 12)
+    assert (len(sessions), sessions["failures"].sum()) == (12, 12)
+    answers = read_by_codebook(reported, "answers", reported / "answers.csv")
     means = answers[answers["statement"] == "S1"].groupby("behaviour")["value"].mean()
     assert means["rigid"] - means["compliant"] == pytest.approx(2.0)
-    assert pq.read_table(reported / "answers.parquet").num_rows == 432
-    assert sessions["failures"].sum() == (~rounds["success"]).sum() == 12
+    assert pq.read_table(reported / "answers.parquet").num_rows == len(answers) == 432
     for name in ("failures", "failure_tests", "rating_means", "rating_tests", "order_effects", "mixed_model"):
         assert len(read_by_codebook(reported / "results", name, reported / "results" / f"{name}.csv")) > 2
     tests = csv_of(reported / "results" / "rating_tests.csv").set_index(["statement", "task"])
@@ -155,7 +153,7 @@ def test_a_session_broken_off_and_void_rounds_are_told(tmp_path: Path):
 
 
 @pytest.mark.slow
-def test_who_withdrew_is_told_with_the_time_and_nothing_else(tmp_path: Path):
+def test_who_withdrew_is_told_with_the_time_and_nothing_else_and_what_was_kept_is_deleted_if_asked(tmp_path: Path):
     out = tmp_path / "out"
     write_study(out, 7, rigid_is_better)
     assert study("export", out).exit_code == 0
@@ -175,22 +173,11 @@ def test_who_withdrew_is_told_with_the_time_and_nothing_else(tmp_path: Path):
     refused = study("replay", out, "P03", "1")
     assert refused.exit_code == 2
     assert "nothing of theirs is shown" in refused.output
-
-
-def test_what_was_kept_is_deleted_if_asked_and_the_number_stays_taken(tmp_path: Path):
-    out = tmp_path / "out"
-    write_study(out, 2, rigid_is_better)
-    assert study("withdraw", out, "2").exit_code == 0
-    when = StudyFolder.read(out).withdrawals[2].ended
-    done = study("withdraw", out, "2", "--delete")
-    assert done.exit_code == 0, done.output
-    assert f"P02 withdrew on {when}: in no table and no test; what was kept is deleted on" in done.output
-    assert [f.name for f in (out / "participants" / "P02").iterdir()] == ["withdrawn.json"]
-    again = StudyFolder.read(out)
-    assert again.next_number == 3
-    assert [s.session.number for s in again.sessions] == [1]
+    done = study("withdraw", out, "3", "--delete")
+    assert f"P03 withdrew on {when}: in no table and no test; what was kept is deleted on" in done.output
+    assert [f.name for f in (out / "participants" / "P03").iterdir()] == ["withdrawn.json"]
+    assert StudyFolder.read(out).next_number == 8
     assert study("withdraw", out, "P09").exit_code == 2
-    assert "P02" in text_of(report_of(out))
 
 
 def test_a_plan_of_other_tasks_has_a_page_without_the_thesis(tmp_path: Path):
@@ -235,16 +222,9 @@ def test_a_round_is_shown_with_its_page(tmp_path: Path):
     assert planned.scenario in page.read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize(
-    ("who", "number"),
-    [
-        pytest.param("P09", "1", id="a participant that is not there"),
-        pytest.param("1", "13", id="a round too many"),
-        pytest.param("1", "3", id="a round without a record"),
-    ],
-)
-def test_a_round_that_cannot_be_shown_is_refused(who: str, number: str, tmp_path: Path, wording: Wording):
+def test_a_round_that_cannot_be_shown_is_refused(tmp_path: Path, wording: Wording):
     write_study(tmp_path / "out", 1, rigid_is_better, never)
-    shown = study("replay", tmp_path / "out", who, number)
-    assert shown.exit_code == 2
-    wording.check(shown.output)
+    for who, number in (("P09", "1"), ("1", "13"), ("1", "3")):  # the third has no record
+        shown = study("replay", tmp_path / "out", who, number)
+        assert shown.exit_code == 2
+        wording.check(shown.output)

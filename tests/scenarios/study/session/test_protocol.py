@@ -191,6 +191,7 @@ def test_who_withdraws_is_not_asked_again_and_is_in_no_result(tmp_path: Path):
     assert withdrawal.during
     assert not withdrawal.deleted
     protocol.study.withdraw(1, "2026-11-25T10:00:00", delete=True)
+    assert [f.name for f in (protocol.study.participants / "P01").iterdir()] == ["withdrawn.json"]
     assert protocol.study.withdrawals[1].ended == withdrawal.ended
     assert Protocol(StudyFolder.opened(tmp_path / "study", PLAN), PLAN.devices).number == 2
 
