@@ -97,7 +97,7 @@ SOFT = "impedance.stiffness_translation=5,0,0,0,67,0,0,0,67"
     ("given", "faults"),
     [
         ((SOFT,), 1),
-        (("robot.lower_J=2,2,2", "robot.upper_J=-1,-1,-1"), 1),
+        (("robot.lower_J=2,2,2", "robot.upper_J=-1,-1,-1"), 2),
         (("force=1000", "axis=w", "duration=-1"), 3),
         (("propulsion=limited", "stuck_nozzle=3"), 1),
     ],

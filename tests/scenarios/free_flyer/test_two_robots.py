@@ -76,7 +76,7 @@ def test_a_run_that_fails_says_why(given: tuple[str, ...], why: TeamCause, metri
 @pytest.mark.slow
 def test_robots_that_do_not_come_to_rest_tell_how_far_from_their_places_they_were(tmp_path: Path):
     noise = (f"navigation_{i}.velocity_noise=0.015" for i in (1, 2))
-    done = run(TwoRobots, tmp_path / "run", *noise, "patience=30")
+    done = run(TwoRobots, tmp_path / "run", *noise)
     assert cause(metric(done, "decided_by")) is TeamCause.OUT_OF_REACH, done.outcome.reason
     away = re.findall(r"gripper (\d) was (\d+) mm from its place", done.outcome.reason)
     record = Record(tmp_path / "run" / "signals.parquet")
