@@ -195,6 +195,13 @@ def record_of_first(session_folder: Path) -> object:
     return json.loads((session_folder / "rounds" / "01.json").read_text(encoding="utf-8"))["record"]
 
 
+@pytest.mark.parametrize(
+    ("without", "repetitions", "fewest"),
+    [
+        pytest.param("human_to_robot|collaborative", 1, 1, marks=pytest.mark.slow, id="two rounds"),
+        pytest.param("", 2, 9, marks=pytest.mark.real_time, id="twelve rounds"),
+    ],
+)
 def test_a_scripted_pilot_plays_rounds_that_survive_a_kill(without: str, repetitions: int, fewest: int, tmp_path: Path):
     plan = pilot_plan(
         tmp_path / "plan.toml", devices='["mouse", "script"]', patience=60, practice=2, repetitions=repetitions,
