@@ -4,14 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.plants.hand_scene import CALM, DT, Scene
+from support.plants.hand_scene import CALM, DT, called
 
 from handover.cosim.blocks.plain_rotation import IDENTITY, Vector, from_rotation_vector, vector
 from handover.cosim.blocks.ports import Floats
 from handover.plants.free_flyer.hand.attachment import Frame
 from handover.plants.free_flyer.hand.box import Box
 from handover.plants.free_flyer.hand.finger_contact import HandFingers
-from handover.plants.free_flyer.hand.hand_and_object import Activity
 from handover.plants.free_flyer.hand.hand_kinematics import (
     CLOSED,
     FINGERS,
@@ -50,12 +49,13 @@ def room(fingers: HandFingers, H: Frame) -> Floats:
     return np.array(rooms)
 
 
-def test_a_hand_has_fourteen_hinges_of_ninety_degrees():
+def test_a_hand_has_fourteen_hinges_of_ninety_degrees_that_turn_at_a_limited_rate():
     assert sum(len(f.lengths) for f in FINGERS) == len(CLOSED) == JOINTS == 14
     for angles in (FULL, STRAIGHT):
-        fingers = HandFingers(SIDES, RATE)
-        fingers.settle(tuple(3.0 * a - 1.0 for a in angles), FAR)
-        assert fingers.angles == angles
+        assert closed_on(FAR, tuple(3.0 * a - 1.0 for a in angles)).angles == angles
+    fingers = HandFingers(SIDES, RATE)
+    fingers.advance(DT, FULL, FAR)
+    np.testing.assert_allclose(fingers.angles, RATE * DT)
 
 
 @pytest.mark.parametrize("finger", FINGERS, ids=[f.name for f in FINGERS])
@@ -70,49 +70,26 @@ def test_bones_keep_their_lengths_and_bend_by_the_joints_angles(finger: Finger):
     assert np.dot(bones[-1], finger.bend) > 0.0
 
 
-def test_joints_turn_at_a_limited_rate():
-    fingers = HandFingers(SIDES, RATE)
-    fingers.advance(DT, FULL, FAR)
-    np.testing.assert_allclose(fingers.angles, RATE * DT)
-
-
 def test_distance_from_a_box_is_that_of_its_nearest_point():
     box = Box((0.1, 0.2, 0.3))
-    for p, d in (
-        ((0.15, 0.0, 0.0), 0.05),
-        ((0.13, 0.24, 0.0), 0.05),
-        ((0.05, 0.0, 0.0), -0.05),
-        ((0.0, 0.0, 0.31), 0.01),
-    ):
+    for p, d in (((0.13, 0.24, 0.0), 0.05), ((0.05, 0.0, 0.0), -0.05), ((0.0, 0.0, 0.31), 0.01)):
         assert box.distance(p) == pytest.approx(d)
-    away, p = box.nearest(((0.2, 0.0, 0.0), (0.12, 0.0, 0.1)))
-    assert away == pytest.approx(0.02)
-    assert p == pytest.approx((0.12, 0.0, 0.1))
     assert box.normal((0.13, 0.24, 0.0)) == pytest.approx((0.6, 0.8, 0.0))
 
 
-def test_no_point_of_a_line_is_nearer_to_a_box_than_its_least_room():
-    box, rng = Box((0.1, 0.2, 0.3)), np.random.default_rng(0)
-    least: list[float] = []
-    for a, b in rng.uniform(-0.5, 0.5, (500, 2, 3)):
-        line = vector(a), vector(0.7 * a + 0.3 * b)
-        least.append(box.least_room(line))
-        assert least[-1] <= box.nearest(line)[0] + 1e-12
-    assert sum(room > 0.0 for room in least) > 100
-
-
-def test_the_nearest_point_of_a_line_is_that_of_many_of_its_points():
-    box, rng = Box((0.01, 0.1, 0.008)), np.random.default_rng(1)
-    at_ends = 0
-    for a, b in rng.uniform(-1.0, 1.0, (400, 2, 3)) * (0.03, 0.12, 0.03):
-        many = [box.distance(vector(a + s * (b - a))) for s in np.linspace(0.0, 1.0, 501)]
-        away, p = box.nearest((vector(a), vector(b)))
-        assert (
-            min(many) - 0.002 * float(np.linalg.norm(b - a)) <= away <= min(many) + 1e-3 * float(np.linalg.norm(b - a))
-        )
+def test_the_nearest_point_of_a_line_is_that_of_many_of_its_points_and_no_nearer_than_its_least_room():
+    box, rng, at_ends, apart = Box((0.01, 0.1, 0.008)), np.random.default_rng(1), 0, 0
+    for a, b in rng.uniform(-1.0, 1.0, (200, 2, 3)) * (0.03, 0.12, 0.03):
+        many = min(box.distance(vector(a + s * (b - a))) for s in np.linspace(0.0, 1.0, 201))
+        line = vector(a), vector(b)
+        away, p = box.nearest(line)
+        assert many - 0.005 * np.linalg.norm(b - a) <= away <= many + 1e-3 * np.linalg.norm(b - a)
         assert away == box.distance(p)
-        at_ends += p in (vector(a), vector(b))
-    assert 50 < at_ends < 350
+        assert box.least_room(line) <= away + 1e-12
+        apart += box.least_room(line) > 0.0
+        at_ends += p in line
+    assert 25 < at_ends < 175
+    assert apart > 20
 
 
 @pytest.mark.parametrize(
@@ -120,7 +97,6 @@ def test_the_nearest_point_of_a_line_is_that_of_many_of_its_points():
     [
         ((0.0, 0.07, 0.0), (0.0, 0.0, 0.0)),
         ((0.004, 0.05, -0.003), (0.1, 0.15, 0.3)),
-        ((0.0, 0.0, 0.0), (0.0, 0.0, -0.3)),
     ],
 )
 def test_fingers_stop_at_the_objects_surface(p: Vector, turn: Vector):
@@ -131,13 +107,8 @@ def test_fingers_stop_at_the_objects_surface(p: Vector, turn: Vector):
     touching = [c.joint for c in fingers.contacts(H, 1e-5) if c.joint is not None]
     assert len(touching) >= 5
     np.testing.assert_allclose(rooms[touching], 0.0, atol=2e-5)
-
-
-def test_each_joint_ends_at_its_own_angle_on_an_object_off_the_middle():
-    angles = closed_on(Frame((0.002, 0.05, 0.0), from_rotation_vector((0.12, 0.1, 0.3)))).angles
-    stopped = [a for a in angles if 0.0 < a < JOINT_MAX]
-    assert len(stopped) >= 9
-    assert len(set(np.round(stopped, 4).tolist())) >= 8
+    stopped = [a for a in fingers.angles if 0.0 < a < JOINT_MAX]
+    assert len(set(np.round(stopped, 4).tolist())) >= (8 if any(turn) else 3)  # each ends at its own angle
 
 
 def test_a_finger_gives_way_to_an_object_that_comes_nearer():
@@ -159,10 +130,5 @@ def test_thumb_and_fingers_enclose_what_is_between_them_only():
 
 
 def test_fingers_of_the_person_differ_by_where_the_object_is():
-    angles: list[Floats] = []
-    for x in (0.0, 0.006):
-        scene = Scene(replace(CALM, p_OH=np.array([x, 0.07, 0.0])))
-        scene.go(2.0, closure=1.0)
-        scene.until(Activity.PULL, light=True)
-        angles.append(scene.y.finger)
-    assert np.sum(np.abs(angles[0] - angles[1]) > 0.01) >= 4
+    a, b = (called(replace(CALM, p_OH=np.array([x, 0.07, 0.0]))).y.finger for x in (0.0, 0.006))
+    assert np.sum(np.abs(a - b) > 0.01) >= 4

@@ -86,110 +86,80 @@ def gripped(dt: float, flyer: FlyerParams = FLYER, kind: str = "", **changes: An
     return loop
 
 
-@pytest.mark.parametrize("dt", [0.016, 0.032])
-def test_energy_of_robot_and_gripped_object_does_not_grow(dt: float):
-    tumbling = replace(FLYER, v_WB_0=np.array([0.05, -0.03, 0.08]), w_WB_0=np.array([0.3, -0.4, 0.5]))
-    loop = gripped(dt, tumbling)
+def test_momentum_of_robot_and_gripped_object_stays_and_energy_does_not_grow():
+    dt = 0.032
+    loop = gripped(dt, replace(FLYER, v_WB_0=np.array([0.1, 0.0, -0.2]), w_WB_0=np.array([0.0, 0.2, 0.1])))
+    before = loop.sums()
     for _ in range(round(2.0 / dt)):
         loop.step(1.0)
     energies: list[float] = []
     for _ in range(round(10.0 / dt)):
         loop.step(1.0)
         energies.append(loop.sums()[-1])
+    after = loop.sums()
+    np.testing.assert_allclose(after[:3], before[:3], atol=1e-12)
+    np.testing.assert_allclose(after[3:6], before[3:6], atol=0.02 * float(np.linalg.norm(before[3:6])))
+    assert np.linalg.norm(loop.h.v_WO) > 0.1
     assert loop.h.holder is Holder.GRIPPER
     assert max(energies) < 1.002 * energies[0]
     assert energies[-1] > 0.8 * energies[0]
 
 
-@pytest.mark.parametrize("dt", [0.016, 0.032])
-def test_a_blow_on_the_grip_dies_away(dt: float):
-    loop = gripped(dt, replace(FLYER, v_WB_0=np.array([0.2, 0.1, -0.3])))
-    for _ in range(round(6.0 / dt)):
+def test_a_blow_on_the_grip_dies_away():
+    loop = gripped(0.032, replace(FLYER, v_WB_0=np.array([0.2, 0.1, -0.3])))
+    for _ in range(190):
         loop.step(1.0)
     forces: list[float] = []
-    for _ in range(round(1.0 / dt)):
+    for _ in range(31):
         loop.step(1.0)
         forces.append(float(np.linalg.norm(loop.h.f_G)))
     assert max(forces) < 0.02  # what is left is the object's way around
     assert loop.h.holder is Holder.GRIPPER
 
 
-@pytest.mark.parametrize("dt", [0.016, 0.032])
-def test_momentum_goes_from_robot_to_object_without_loss(dt: float):
-    loop = gripped(dt, replace(FLYER, v_WB_0=np.array([0.1, 0.0, -0.2]), w_WB_0=np.array([0.0, 0.2, 0.1])))
-    before = loop.sums()
-    for _ in range(round(4.0 / dt)):
-        loop.step(1.0)
-    after = loop.sums()
-    np.testing.assert_allclose(after[:3], before[:3], atol=1e-12)
-    np.testing.assert_allclose(after[3:6], before[3:6], atol=0.02 * float(np.linalg.norm(before[3:6])))
-    assert 0.1 * np.linalg.norm(loop.h.v_WO) > 0.01
-
-
-@pytest.mark.parametrize(("dt", "kind"), [(0.016, "rigid"), (0.032, "compliant"), (0.032, "")])
+@pytest.mark.parametrize(("dt", "kind"), [(0.016, "rigid"), (0.032, "")])
 def test_held_by_both_all_comes_to_rest(dt: float, kind: str):
-    loop = gripped(
-        dt,
-        kind=kind,
-        motion=Motion.TAKE,
-        reaction_time=0.0,
-        pull_distance=0.02,
-        patience=1e4,
-        grasp_time=0.05,
-        reach_speed=3.0,
-    )
-    speeds = [step_and_look(loop) for _ in range(round(16.0 / dt))]
+    prompt: dict[str, Any] = {"reaction_time": 0.0, "grasp_time": 0.05, "reach_speed": 3.0}
+    loop = gripped(dt, kind=kind, motion=Motion.TAKE, pull_distance=0.02, patience=1e4, **prompt)
+    speeds = speeds_of(loop, 1.0, round(16.0 / dt))
     early, late = max(speeds[: len(speeds) // 2]), max(speeds[3 * len(speeds) // 4 :])
     assert loop.h.holder is Holder.BOTH
     assert late < (0.01 if kind else 0.3) * early  # a robot that only the hand holds swings for long
 
 
-def step_and_look(loop: Loop) -> float:
-    loop.step(1.0, light=True)
-    return float(np.linalg.norm(loop.y.v_WG))
+def speeds_of(loop: Loop, closure: float, steps: int) -> list[float]:
+    speeds: list[float] = []
+    for _ in range(steps):
+        loop.step(closure, light=True)
+        speeds.append(float(np.linalg.norm(loop.y.v_WG)))
+    return speeds
 
 
-@pytest.mark.parametrize(("dt", "kind"), [(0.032, "rigid"), (0.016, "compliant")])
-def test_robot_yields_to_a_pull_as_its_stiffness_says(dt: float, kind: str):
-    loop = gripped(dt, kind=kind, motion=Motion.TAKE, pull_distance=0.03, patience=1e4)
-    loop_until_rest(loop, 16.0)
-    k = KINDS[kind][0]
-    np.testing.assert_allclose(loop.y.p_WB - FLYER.p_WB_0, loop.h.f_G / k, atol=2e-4)
+def test_robot_yields_to_a_pull_as_its_stiffness_says():
+    loop = gripped(0.032, kind="compliant", motion=Motion.TAKE, pull_distance=0.03, patience=1e4)
+    speeds_of(loop, 1.0, 500)
+    np.testing.assert_allclose(loop.y.p_WB - FLYER.p_WB_0, loop.h.f_G / KINDS["compliant"][0], atol=2e-4)
     np.testing.assert_allclose(loop.h.f_G, -loop.h.f_H, atol=2e-3)
     assert loop.h.f_G[2] > 0.05
 
 
-def loop_until_rest(loop: Loop, seconds: float) -> None:
-    for _ in range(round(seconds / loop.dt)):
-        loop.step(1.0, light=True)
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_pull_and_push_pass_the_published_thresholds(kind: str):
+@pytest.mark.parametrize(("kind", "of_take", "of_give"), [("rigid", 0.059, 0.021), ("compliant", 0.08, 0.037)])
+def test_pull_and_push_pass_the_published_thresholds(kind: str, of_take: float, of_give: float):
     strong: dict[str, Any] = {"effort": 4.0, "arm_force_max": 6.0, "motion_again": Motion.NONE}
-    take = gripped(0.016, kind=kind, motion=Motion.TAKE, seed=1, **strong)
-    assert highest_speed(take, 1.0) > {"rigid": 0.059, "compliant": 0.08}[kind]
+    take = gripped(0.032, kind=kind, motion=Motion.TAKE, seed=1, **strong)
+    assert max(speeds_of(take, 1.0, 250)) > of_take
     give = replace(STILL, motion=Motion.GIVE, object_with=StartHolder.HAND, **strong)
-    assert highest_speed(Loop(give, 0.016, kind=kind), 0.0) > {"rigid": 0.021, "compliant": 0.037}[kind]
-
-
-def highest_speed(loop: Loop, closure: float) -> float:
-    speeds: list[float] = []
-    for _ in range(500):
-        loop.step(closure, light=True)
-        speeds.append(float(np.linalg.norm(loop.y.v_WG)))
-    return max(speeds)
+    assert max(speeds_of(Loop(give, 0.032, kind=kind), 0.0, 250)) > of_give
 
 
 def test_results_do_not_hang_on_the_step():
     def path(dt: float) -> Floats:
         loop = gripped(dt, kind="compliant", motion=Motion.TAKE, pull_distance=0.05, patience=1e4, reaction_time=0.0)
-        loop_until_rest(loop, 3.2)
+        speeds_of(loop, 1.0, round(3.2 / dt))
         return np.concatenate([loop.y.p_WG, loop.h.p_WO])
 
-    fine = path(0.004)
+    fine = path(0.008)
     assert np.linalg.norm(fine[:3] - [0.0, -0.07, 0.0]) > 0.01
-    np.testing.assert_allclose(path(0.016), fine, atol=2e-3)
     np.testing.assert_allclose(path(0.032), fine, atol=4e-3)
 
 

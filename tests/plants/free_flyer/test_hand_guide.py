@@ -1,7 +1,6 @@
 """The hand led from outside: what it follows, how fast, and what it does when tracking is lost."""
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from itertools import groupby, pairwise
 from typing import Any
@@ -9,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from support.plants.hand_scene import DT, IDLE, PLACE, Scene
+from support.plants.hand_scene import DT, IDLE, Scene, off
 from support.restored_states import assert_continues
 
 from handover.cosim.blocks.plain_rotation import angle_between, quaternion
 from handover.cosim.blocks.ports import Floats
-from handover.plants.free_flyer.hand.hand_and_object import Driver, HandAndObject, Holder, Inputs, StartHolder
+from handover.plants.free_flyer.hand.hand_and_object import Driver, HandAndObject, Holder, Inputs, Params, StartHolder
 from handover.plants.free_flyer.hand.hand_kinematics import CLOSED
 
 LED = replace(IDLE, driven_by=Driver.OUTSIDE)
@@ -25,19 +24,13 @@ END = np.array([0.0, 0.07, 0.0])
 FIST = np.array(CLOSED)
 
 
-def from_(p: Floats, x: float, y: float, z: float) -> Floats:
-    """Return a place that is so far from another, m."""
-    return p + np.array([x, y, z])
-
-
 def turned(angles: Floats) -> Floats:
     return Rotation.from_euler("ZYX", angles[::-1]).as_quat(scalar_first=True)
 
 
-def lag(wanted: Floats, followed: Floats) -> float:
+def delay(wanted: Floats, followed: Floats) -> float:
     """Return the shift at which a followed curve is most like the wanted one, s."""
-    shifts = range(20)
-    errors = [float(np.sum((wanted[: len(wanted) - n] - followed[n:]) ** 2)) for n in shifts]
+    errors = [float(np.sum((wanted[: len(wanted) - n] - followed[n:]) ** 2)) for n in range(20)]
     return DT * int(np.argmin(errors))
 
 
@@ -48,31 +41,25 @@ def moving(t: float) -> float:
 
 @pytest.mark.parametrize("channel", range(6), ids=["x", "y", "z", "roll", "pitch", "yaw"])
 def test_hand_follows_each_channel_of_pose_with_less_than_a_tenth_of_a_second_of_delay(channel: int):
-    """[Fernandes2020] figs. 4.21 to 4.26: 15 cm and 60 degrees to either side."""
-    scene = Scene(LED, AWAY)
-    wanted, followed, others = list[float](), list[float](), list[float]()
-    for k in range(500):
-        s = moving(k * DT)
-        pose = np.zeros(6)
-        pose[channel] = s * (0.15 if channel < 3 else math.radians(60.0))
-        y = scene.go(DT, p_WH_track=REST + pose[:3], q_WH_track=turned(pose[3:]))
+    """[Fernandes2020] figs. 4.21 to 4.26: 15 cm and 60 degrees to either side; an age at its limit is fresh."""
+    scene, wanted, got = Scene(LED, AWAY), np.zeros((250, 6)), np.zeros((250, 6))
+    for k in range(250):
+        wanted[k, channel] = moving(k * DT) * (0.15 if channel < 3 else math.radians(60.0))
+        y = scene.go(DT, p_WH_track=REST + wanted[k, :3], q_WH_track=turned(wanted[k, 3:]), age=0.2)
         angles = Rotation.from_quat(y.q_WH, scalar_first=True).as_euler("ZYX")[::-1]
-        got = np.concatenate([y.p_WH - REST, angles])
-        wanted.append(pose[channel])
-        followed.append(got[channel])
-        others.append(float(np.max(np.abs(np.delete(got, channel)))))
-    assert 0.0 < lag(np.array(wanted), np.array(followed)) < 0.1
-    assert max(others) < 1e-9
-    assert max(followed) > 0.97 * max(wanted)
+        got[k] = [*(y.p_WH - REST), *angles]
+    assert 0.0 < delay(wanted[:, channel], got[:, channel]) < 0.1
+    assert np.max(np.abs(np.delete(got, channel, axis=1))) < 1e-9
+    assert np.max(got) > 0.97 * np.max(wanted)
 
 
 def test_joints_follow_a_fist_with_less_than_a_tenth_of_a_second_of_delay():
     """[Fernandes2020] fig. 4.27: a fist, twice."""
     scene = Scene(LED, AWAY)
-    wanted = [max(0.0, moving(k * DT)) * FIST for k in range(500)]
+    wanted = [max(0.0, moving(k * DT)) * FIST for k in range(250)]
     followed = [scene.go(DT, finger_track=w).finger for w in wanted]
     for joint in range(14):
-        assert lag(np.array(wanted)[:, joint], np.array(followed)[:, joint]) < 0.1
+        assert delay(np.array(wanted)[:, joint], np.array(followed)[:, joint]) < 0.1
     np.testing.assert_allclose(np.max(followed, axis=0), FIST, atol=1e-2)
 
 
@@ -92,32 +79,33 @@ def test_a_wanted_pose_that_jumps_moves_the_hand_no_faster_than_an_arm(jump: Flo
 
 
 def test_noise_of_a_tracker_is_attenuated():
-    rng = np.random.default_rng(0)
-    scene = Scene(LED, AWAY)
-    for _ in range(1000):
+    rng, scene = np.random.default_rng(0), Scene(LED, AWAY)
+    for _ in range(500):
         scene.go(DT, p_WH_track=REST + 0.01 * rng.standard_normal(3))
-    p = np.array([y.p_WH for y in scene.seen[200:]])
-    assert np.max(np.std(p, axis=0)) < 0.006
+    assert np.max(np.std([y.p_WH for y in scene.seen[200:]], axis=0)) < 0.006
 
 
 def test_attitude_is_limited_to_ninety_degrees():
     scene = Scene(LED, AWAY)
     for angle, ends in ((2.5, 0.5 * math.pi), (-2.5, -0.5 * math.pi), (1.4, 1.4)):
         for axis in (0, 2):
-            angles = np.zeros(3)
-            angles[axis] = angle
-            y = scene.go(2.0, q_WH_track=turned(angles))
+            y = scene.go(2.0, q_WH_track=turned(angle * np.eye(3)[axis]))
             got = Rotation.from_quat(y.q_WH, scalar_first=True).as_rotvec()
             assert got[axis] == pytest.approx(ends, abs=1e-3)
 
 
+def around(params: Params = LED) -> Scene:
+    """Return a scene in which the free object lies in the open hand."""
+    scene = Scene(params, AWAY)
+    scene.go(1.5, p_WH_track=END + np.array([0.0, 0.0, 0.05]))
+    scene.go(1.0, p_WH_track=END)
+    return scene
+
+
 def grasping() -> Scene:
     """Return a scene in which the hand has taken a free object."""
-    scene = Scene(LED, AWAY)
-    scene.go(1.5, p_WH_track=from_(END, 0.0, 0.0, 0.05))
-    scene.go(1.0, p_WH_track=END)
-    scene.go(0.08, finger_track=FIST, closed_track=True)
-    assert scene.y.holder is Holder.FREE
+    scene = around()
+    assert scene.go(0.08, finger_track=FIST, closed_track=True).holder is Holder.FREE
     scene.go(0.5)
     return scene
 
@@ -125,56 +113,43 @@ def grasping() -> Scene:
 def test_takes_hold_only_of_what_thumb_and_fingers_enclose():
     assert grasping().y.holder is Holder.HAND
     beside = Scene(LED, AWAY)
-    beside.go(1.5, p_WH_track=from_(END, 0.0, 0.2, 0.0))
+    beside.go(1.5, p_WH_track=END + np.array([0.0, 0.2, 0.0]))
     assert beside.go(1.0, finger_track=FIST, closed_track=True).holder is Holder.FREE
-    straight = Scene(LED, AWAY)
-    straight.go(1.5, p_WH_track=from_(END, 0.0, 0.0, 0.05))
-    straight.go(1.0, p_WH_track=END)
-    assert straight.go(1.0, closed_track=True).holder is Holder.FREE
+    assert around().go(1.0, closed_track=True).holder is Holder.FREE
 
 
-def test_fingers_that_close_on_a_free_object_and_do_not_hold_it_squeeze_it_out_slowly():
+@pytest.mark.parametrize("mass", [0.002, 0.1, 10.0])
+def test_fingers_that_close_on_a_free_object_and_do_not_hold_it_squeeze_it_out_slowly(mass: float):
     """There is no friction but the hold's."""
-    scene = Scene(LED, AWAY)
-    scene.go(1.5, p_WH_track=from_(END, 0.0, 0.0, 0.05))
-    scene.go(1.0, p_WH_track=END)
-    y = scene.go(2.0, finger_track=FIST)
-    assert y.holder is Holder.FREE
-    assert max(np.linalg.norm(s.v_WO) for s in scene.seen) < 0.2
-    assert max(np.linalg.norm(s.f_H) for s in scene.seen) < 14 * LED.finger_force + 0.2
+    scene = around(replace(LED, object_mass=mass))
+    assert scene.go(2.0, finger_track=FIST).holder is Holder.FREE
+    assert max(np.linalg.norm(s.v_WO) for s in scene.seen) < (0.2 if mass == 0.1 else 1.0)
+    assert mass != 0.1 or max(np.linalg.norm(s.f_H) for s in scene.seen) < 14 * LED.finger_force + 0.2
 
 
 @pytest.mark.parametrize(
     "lost",
     [
-        lambda: {"age": 0.21},
-        lambda: {"age": math.nan},
-        lambda: {"p_WH_track": np.array([math.nan, 0.0, 0.0])},
-        lambda: {"q_WH_track": np.zeros(4)},
-        lambda: {"finger_track": np.full(14, math.inf)},
+        {"age": 0.21},
+        {"age": math.nan},
+        {"p_WH_track": np.array([math.nan, 0.0, 0.0])},
+        {"q_WH_track": np.zeros(4)},
+        {"finger_track": np.full(14, math.inf)},
     ],
 )
-def test_hand_stops_and_keeps_what_it_holds_while_tracking_is_lost(lost: Callable[[], dict[str, Any]]):
-    scene = grasping()
-    before = scene.go(0.5, p_WH_track=from_(END, 0.0, 0.3, 0.0))
-    there = from_(END, 0.5, 0.3, 0.0)
+def test_hand_stops_and_keeps_what_it_holds_while_tracking_is_lost(lost: dict[str, Any]):
+    scene, there = grasping(), END + np.array([0.5, 0.3, 0.0])
+    before = scene.go(0.5, p_WH_track=END + np.array([0.0, 0.3, 0.0]))
     told: dict[str, Any] = {"closed_track": False, "finger_track": np.zeros(14), "p_WH_track": there}
-    y = scene.go(1.0, **(told | lost()))
+    y = scene.go(1.0, **(told | lost))
     assert y.holder is Holder.HAND
     assert np.linalg.norm(y.p_WH - before.p_WH) < 0.12
-    later = scene.go(1.0)
-    np.testing.assert_allclose(later.p_WH, y.p_WH, atol=2e-3)
+    np.testing.assert_allclose(scene.go(0.5).p_WH, y.p_WH, atol=2e-3)
     again = scene.go(1.5, age=0.05, q_WH_track=np.array([1.0, 0.0, 0.0, 0.0]), **told)
     assert again.holder is Holder.FREE
     np.testing.assert_allclose(again.p_WH, there, atol=1e-3)
     speeds = np.linalg.norm(np.diff([s.p_WH for s in scene.seen[-90:]], axis=0), axis=1) / DT
     assert np.max(speeds) <= 2.0 + 1e-9
-
-
-def test_age_at_its_limit_is_fresh():
-    scene = Scene(LED, AWAY)
-    y = scene.go(1.0, p_WH_track=from_(REST, 0.1, 0.0, 0.0), age=0.2)
-    np.testing.assert_allclose(y.p_WH, from_(REST, 0.1, 0.0, 0.0), atol=1e-4)
 
 
 def test_a_hand_that_is_moved_against_a_free_object_pushes_it_away_and_feels_it():
@@ -189,17 +164,9 @@ def test_a_hand_that_is_moved_against_a_free_object_pushes_it_away_and_feels_it(
     assert np.linalg.norm(scene.y.v_WO) < 0.5
 
 
-@pytest.mark.parametrize("mass", [0.002, 0.1, 10.0])
-def test_contact_is_stable_whatever_the_objects_mass(mass: float):
-    scene = Scene(replace(LED, object_mass=mass), AWAY)
-    scene.go(1.5, p_WH_track=from_(END, 0.0, 0.0, 0.05))
-    scene.go(3.0, p_WH_track=END, finger_track=FIST)
-    assert max(np.linalg.norm(y.v_WO) for y in scene.seen) < 1.0
-
-
 def test_open_fingers_are_felt_by_the_gripper():
     scene = Scene(replace(LED, p_WO_0=np.array([0.0, 2.0, 0.0])))
-    y = scene.go(2.0, p_WH_track=from_(PLACE, -0.06, 0.0, -0.036))
+    y = scene.go(2.0, p_WH_track=off(-0.06, z=-0.036))
     assert y.f_G[0] > 0.1
     np.testing.assert_allclose(y.f_G, -y.f_H, atol=1e-12)
     assert np.linalg.norm(y.f_G) <= LED.arm_force_max + 1e-9
@@ -216,8 +183,7 @@ def test_goes_on_bit_for_bit_after_a_state_is_restored():
             age=0.3 if 180 < i < 190 else 0.0,
         )
 
-    params = replace(LED, object_with=StartHolder.FREE)
-    assert_continues(lambda: HandAndObject(params), inputs, [5, 105, 130, 155, 180, 205], 55)
+    assert_continues(lambda: HandAndObject(LED), inputs, [5, 105, 130, 155, 180], 30)
 
 
 def test_an_object_in_a_hand_that_turns_at_a_constant_rate_does_not_lag():
@@ -252,5 +218,5 @@ def test_a_hand_that_holds_the_object_and_was_never_tracked_stays_closed():
 def test_a_closed_hand_that_lost_the_object_beyond_its_reach_does_not_take_it_again():
     scene = grasping()
     begin = len(scene.seen)
-    scene.go(3.0, p_WH_track=from_(END, 0.8, 0.0, 0.0))
+    scene.go(3.0, p_WH_track=END + np.array([0.8, 0.0, 0.0]))
     assert [k for k, _ in groupby(y.holder for y in scene.seen[begin:])] == [Holder.HAND, Holder.FREE]

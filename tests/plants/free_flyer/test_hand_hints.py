@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from support.plants.hand_scene import IDLE, Scene
 
+from handover.cosim.blocks.plain_rotation import Vector
 from handover.cosim.record.reader import Record
 from handover.plants.free_flyer.hand.hand_and_object import Driver, Holder, StartHolder
 from handover.plants.free_flyer.hand.hand_kinematics import CLOSED
@@ -50,7 +51,6 @@ def hint_of(scene: Scene, receivers: tuple[str, ...], closed: bool = False) -> H
 @pytest.mark.parametrize(
     ("aside", "within"),
     [
-        ((0.0, 0.0, 0.0), True),
         ((-0.025, 0.0, 0.0), True),
         ((0.018, 0.0, 0.02), True),
         ((0.0, 0.022, 0.0), True),
@@ -59,9 +59,7 @@ def hint_of(scene: Scene, receivers: tuple[str, ...], closed: bool = False) -> H
         ((0.0, 0.0, -0.054), False),
     ],
 )
-def test_a_hand_within_reach_gets_the_object_as_it_closes_and_one_that_is_not_misses(
-    aside: tuple[float, float, float], within: bool
-):
+def test_a_hand_within_reach_gets_the_object_as_it_closes_and_one_that_is_not_misses(aside: Vector, within: bool):
     scene, there = Scene(LED), BEST + np.array(aside)
     scene.go(0.4, p_WH_track=there - np.array([0.25, 0.0, 0.0]), closure=1.0)
     assert not hint_of(scene, ("HAND",)).within_reach
@@ -75,16 +73,14 @@ def test_a_hand_within_reach_gets_the_object_as_it_closes_and_one_that_is_not_mi
     scene.go(0.8, closed_track=True, finger_track=np.array(CLOSED))
     assert (scene.y.holder == Holder.BOTH) == within
     hint = hint_of(scene, ("HAND",), closed=True)
-    assert hint.holds == within
-    assert ("0.045 of 0.059 m/s" in hint.advice) == within
+    assert (hint.holds, "0.045 of 0.059 m/s" in hint.advice) == (within, within)
 
 
 def test_the_object_in_a_hand_is_within_reach_between_the_fingers():
     scene = Scene(replace(LED, object_with=StartHolder.HAND), np.array([-0.1, 0.0, 0.0]))
     scene.go(0.1, closed_track=True)
     hint = hint_of(scene, ("GRIPPER",), closed=True)
-    assert hint.holds
-    assert not hint.within_reach
+    assert (hint.holds, hint.within_reach) == (True, False)
     assert hint.goal is not None
     scene.u.p_WG = scene.u.p_WG - (hint.goal - hint.p_WH)  # the gripper comes as far as the hand would go
     assert hint_of(scene, ("GRIPPER",), closed=True).within_reach

@@ -38,13 +38,6 @@ def spoiled(path: Path, **changes: tuple[int, object]) -> Path:
     return path
 
 
-def test_a_track_is_read_as_excel_writes_it(tmp_path: Path):
-    path = tmp_path / "track.csv"
-    write_track(path, poses())
-    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
-    assert read_track(path, 0.2).times == tuple(t for t, _ in poses())
-
-
 def test_a_track_is_read_as_it_was_written(tmp_path: Path):
     write_track(tmp_path / "t.csv", poses())
     track = read_track(tmp_path / "t.csv", 0.2)
@@ -60,10 +53,10 @@ def test_a_track_is_read_as_it_was_written(tmp_path: Path):
     assert track.at(99.0) == track.at(0.05 * 59)
 
 
-def test_columns_may_stand_in_any_order(tmp_path: Path):
+def test_columns_may_stand_in_any_order_after_excels_byte_order_mark(tmp_path: Path):
     write_track(tmp_path / "t.csv", poses())
     rows = [line.split(",") for line in (tmp_path / "t.csv").read_text().splitlines()]
-    (tmp_path / "u.csv").write_text("\n".join(",".join(reversed(row)) for row in rows))
+    (tmp_path / "u.csv").write_text("\ufeff" + "\n".join(",".join(reversed(row)) for row in rows), encoding="utf-8")
     assert read_track(tmp_path / "u.csv", 0.2).at(1.234) == read_track(tmp_path / "t.csv", 0.2).at(1.234)
 
 
@@ -120,17 +113,17 @@ def test_a_file_that_is_no_track_is_refused(tmp_path: Path, text: str | None, wo
     wording.check(refused.value)
 
 
-@pytest.mark.parametrize("params", [Params(driven_by=Driver.TRACK), Params(track="t.csv")], ids=["none", "not driven"])
-def test_a_driver_without_a_track_and_a_track_without_a_driver_are_refused(params: Params, wording: Wording):
-    with pytest.raises(InvalidHandParameters) as refused:
-        HandAndObject(params)
-    wording.check(refused.value)
+def test_a_driver_without_a_track_and_a_track_without_a_driver_are_refused(wording: Wording):
+    for params in (Params(driven_by=Driver.TRACK), Params(track="t.csv")):
+        with pytest.raises(InvalidHandParameters) as refused:
+            HandAndObject(params)
+        wording.check(refused.value)
 
 
 def test_hand_follows_a_track_without_delay_as_its_rows_are_known_beforehand(tmp_path: Path):
     write_track(tmp_path / "t.csv", poses(200))
     scene = Scene(replace(IDLE, driven_by=Driver.TRACK, track=str(tmp_path / "t.csv")), AWAY)
-    scene.go(9.0)
+    scene.go(5.0)
     wanted, followed = (np.array([getattr(y, n) for y in scene.seen[60:]]) for n in ("p_WH_goal", "p_WH"))
     errors = [np.sum((wanted[5 : len(wanted) - 5] - followed[5 + n : len(wanted) - 5 + n]) ** 2) for n in range(-4, 5)]
     assert int(np.argmin(errors)) == 4

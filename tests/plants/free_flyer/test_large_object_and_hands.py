@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support.plants.hand_scene import DT, EXACT, Steps, body_sums
+from support.restored_states import flat
 from support.wording import Wording
 
 from handover.cosim.blocks.plain_rotation import (
@@ -18,7 +19,6 @@ from handover.cosim.blocks.plain_rotation import (
 )
 from handover.cosim.blocks.ports import Floats
 from handover.plants.free_flyer.hand.attachment import Frame
-from handover.plants.free_flyer.hand.parameters import InvalidHandParameters
 from handover.plants.free_flyer.large_object.hand_pair import middle_of_grippers
 from handover.plants.free_flyer.large_object.large_object_and_hands import (
     Activity,
@@ -68,18 +68,9 @@ class Loop:
             robot.step(self.t, self.dt, FlyerInputs(f_G=f, tau_G=tau))
             for robot, (f, tau) in zip(self.robots, wrenches, strict=True)
         ]
-        a, b = self.ys
-        u = Inputs(
-            p_WG_1=a.p_WG,
-            q_WG_1=a.q_WG,
-            v_WG_1=a.v_WG,
-            w_WG_1=a.w_WG,
-            p_WG_2=b.p_WG,
-            q_WG_2=b.q_WG,
-            v_WG_2=b.v_WG,
-            w_WG_2=b.w_WG,
-        )
-        self.h = self.unit.step(self.t, self.dt, replace(u, **changes))
+        names = ("p_WG", "q_WG", "v_WG", "w_WG")
+        of = {f"{name}_{i}": getattr(y, name) for i, y in enumerate(self.ys, 1) for name in names}
+        self.h = self.unit.step(self.t, self.dt, Inputs(**of, **changes))
         self.t += self.dt
 
     def sums(self) -> Floats:
@@ -104,43 +95,25 @@ class Loop:
         return energy
 
 
-def gripped(dt: float, *flyers: FlyerParams) -> Loop:
-    loop = Loop(replace(IDLE, gripper_rate=100.0), dt, *flyers)
+def test_momentum_of_two_robots_and_the_gripped_object_stays_and_energy_does_not_grow():
+    moving = replace(FLYER, v_WB_0=np.array([0.05, -0.03, 0.04]), w_WB_0=np.array([0.1, -0.1, 0.1]))
+    dt = 0.032
+    loop = Loop(replace(IDLE, gripper_rate=100.0), dt, moving, FLYER)
     while loop.h.grippers_holding is not Holding.BOTH:
         loop.step(**CLOSE)
         assert loop.t < 0.1
-    return loop
-
-
-@pytest.mark.parametrize("dt", [pytest.param(0.016, marks=pytest.mark.slow), 0.032])
-def test_energy_of_two_robots_and_the_gripped_object_does_not_grow(dt: float):
-    tumbling = (
-        replace(FLYER, v_WB_0=np.array([0.05, -0.03, 0.04]), w_WB_0=np.array([0.1, -0.1, 0.1])),
-        replace(FLYER, v_WB_0=np.array([-0.02, 0.03, 0.06]), w_WB_0=np.array([-0.1, 0.05, 0.2])),
-    )
-    loop = gripped(dt, *tumbling)
-    energies: list[float] = []
+    before, energies = loop.sums(), list[float]()
     for _ in range(round(12.0 / dt)):
         loop.step(**CLOSE)
         energies.append(loop.sums()[-1] + loop.elastic_energy())
-    assert loop.h.grippers_holding is Holding.BOTH
-    settled = np.array(energies[round(2.0 / dt) :])
-    assert np.max(np.diff(settled)) < 1e-4 * settled[0]
-    assert settled[-1] > 0.8 * settled[0]  # what turns as one has nothing to lose
-    assert settled[0] < 0.8 * energies[0]  # what shook between the grips has
-
-
-@pytest.mark.parametrize("dt", [0.016, pytest.param(0.032, marks=pytest.mark.slow)])
-def test_momentum_of_robots_and_object_stays(dt: float):
-    moving = replace(FLYER, v_WB_0=np.array([0.1, 0.0, -0.1]), w_WB_0=np.array([0.0, 0.1, 0.05]))
-    loop = gripped(dt, moving, FLYER)
-    before = loop.sums()
-    for _ in range(round(4.0 / dt)):
-        loop.step(**CLOSE)
     after = loop.sums()
     np.testing.assert_allclose(after[:3], before[:3], atol=1e-12)
     np.testing.assert_allclose(after[3:6], before[3:6], atol=0.02 * float(np.linalg.norm(before[3:6])))
     assert np.linalg.norm(loop.ys[1].v_WB) > 0.01  # the other robot is drawn along
+    settled = np.array(energies[round(2.0 / dt) :])
+    assert np.max(np.diff(settled)) < 1e-4 * settled[0]
+    assert settled[-1] > 0.8 * settled[0]  # what turns as one has nothing to lose
+    assert settled[0] < 0.85 * energies[0]  # what shook between the grips has
 
 
 def test_hands_take_what_grippers_and_object_give():
@@ -189,17 +162,10 @@ def test_the_person_keeps_on_while_one_gripper_still_holds():
     s.until(Activity.WITHDRAW, closure_2=0.0)
 
 
-def test_the_light_of_one_robot_is_no_signal():
+def test_the_light_of_one_robot_is_no_signal_and_robots_may_signal_one_after_the_other():
     s = scene(CALM)
     s.go(1.0, **CLOSE)
-    assert s.go(3.0, light_1=True).activity is Activity.WAIT
-    s.until(Activity.REACH, light_2=True)
-
-
-def test_robots_may_signal_one_after_the_other():
-    s = scene(CALM)
-    s.go(1.0, **CLOSE)
-    s.go(1.0, light_1=True)
+    s.go(2.0, light_1=True)
     assert s.go(1.0, light_1=False).activity is Activity.WAIT
     s.until(Activity.REACH, light_2=True)
 
@@ -228,30 +194,17 @@ def test_one_hand_at_an_end_draws_at_the_gripper_opposite_more():
     assert turned[1] > 1.0
 
 
-def test_a_second_hand_that_is_late_takes_hold_later():
-    s = scene(replace(CALM, hand_delay=0.2))
-    s.go(1.0, **CLOSE)
-    s.until(Activity.REST, **SIGNAL)
-    held = [y.hands_holding for y in s.seen]
-    first, both = held.index(Holding.FIRST), held.index(Holding.BOTH)
-    assert abs((both - first) * DT - 0.2) <= DT
-
-
-def test_a_second_hand_that_is_much_too_late_makes_the_person_try_again():
-    s = scene(replace(CALM, hand_delay=0.7))
-    s.go(1.0, **CLOSE)
-    s.until(Activity.REST, **SIGNAL)
-    kinds = [y.activity for y in s.seen]
-    pulls = [a for a, b in zip(kinds, [None, *kinds], strict=False) if a is not b and a is Activity.PULL]
-    assert len(pulls) == CALM.attempts
-    assert Holding.BOTH not in [y.hands_holding for y in s.seen]
-
-
-def test_two_fists_push_both_grippers():
-    s = scene(replace(CALM, motion=Motion.PUSH, p_WO_0=np.array([0.1, -1.5, 0.0])))
-    s.until(Activity.PUSH, **SIGNAL)
-    s.go(1.0)
-    np.testing.assert_allclose([s.y.f_G_1[0], s.y.f_G_2[0]], [1.0, 1.0], atol=0.3)
+def test_a_second_hand_that_is_late_takes_hold_later_and_one_that_is_much_too_late_makes_the_person_try_again():
+    for delay in (0.2, 0.7):
+        s = scene(replace(CALM, hand_delay=delay, patience=1.0))
+        s.go(1.0, **CLOSE)
+        s.until(Activity.REST, **SIGNAL)
+        held = [y.hands_holding for y in s.seen]
+        if delay == 0.2:
+            assert abs((held.index(Holding.BOTH) - held.index(Holding.FIRST)) * DT - 0.2) <= DT
+        else:
+            assert s.activities().count(Activity.PULL) == CALM.attempts
+            assert Holding.BOTH not in held
 
 
 @pytest.mark.parametrize(("near", "far"), [(1, 2), (2, 1)])
@@ -260,6 +213,7 @@ def test_a_fist_pushes_its_gripper_though_it_is_beside_and_beyond_the_palm_of_th
     s.go(DT, **{f"p_WG_{near}": getattr(s.u, f"p_WG_{near}") - np.array([0.1, 0.0, 0.0])})
     s.until(Activity.PUSH, **SIGNAL)
     s.go(1.0)
+    np.testing.assert_allclose([s.y.f_G_1[0], s.y.f_G_2[0]], [1.0, 1.0], atol=0.3)
     for _ in range(10):  # towards the fist
         y = s.go(DT, **{f"p_WG_{far}": getattr(s.u, f"p_WG_{far}") - np.array([0.001, 0.0, 0.0])})
         assert getattr(y, f"f_G_{far}")[0] > 0.5
@@ -271,12 +225,10 @@ def test_a_restored_state_continues_bit_for_bit(params: Params):
     s.go(1.0, **({} if params.object_with is StartHolder.HAND else CLOSE))
     s.until(Activity.PULL if params.motion is Motion.TAKE else Activity.PUSH, **SIGNAL)
     for closure in (1.0, 0.0):
-        s.go(0.2, closure_1=closure)
+        s.go(0.1, closure_1=closure)
         other.unit.set_state(s.unit.get_state())
         other.u, other.i = s.u, s.i
-        a, b = s.go(1.0), other.go(1.0)
-        for name, value in vars(a).items():
-            np.testing.assert_array_equal(value, getattr(b, name), err_msg=name)
+        np.testing.assert_array_equal(flat(s.go(0.5)), flat(other.go(0.5)))
 
 
 def test_the_middle_of_grippers_lies_along_the_line_between_them():
@@ -291,16 +243,11 @@ def test_the_middle_of_grippers_lies_along_the_line_between_them():
 
 
 def test_faults_are_told_all_at_once(wording: Wording):
+    false = Params(p_OH=np.array([-0.2, 0.0, 0.0]), motion=Motion.GIVE, hand_spacing=0.05, pull_direction=np.zeros(3))
     with pytest.raises(InvalidLargeObjectParameters) as e:
-        LargeObjectAndHands(
-            Params(p_OH=np.array([-0.2, 0.0, 0.0]), motion=Motion.GIVE, hand_spacing=0.05, pull_direction=np.zeros(3))
-        )
+        LargeObjectAndHands(false)
     wording.check(e.value)
-    assert not isinstance(e.value, InvalidHandParameters)
-
-
-def test_a_closed_gripper_around_a_handle_is_rejected(wording: Wording):
-    unit = LargeObjectAndHands(replace(IDLE, angle_0=0.6))
+    around_a_handle = LargeObjectAndHands(replace(IDLE, angle_0=0.6))
     with pytest.raises(InvalidLargeObjectParameters) as e:
-        unit.step(0.0, DT, Inputs())
+        around_a_handle.step(0.0, DT, Inputs())
     wording.check(e.value)

@@ -68,13 +68,12 @@ def each_axis(what: dict[str, float]) -> Floats:
 
 
 def test_noise_is_white_and_as_far_off_as_declared():
-    off_by = errors(replace(Params(seed=5), **{f"{what}_noise": x for what, x in UNLIKE_EACH_OTHER.items()}), 4000)
-    np.testing.assert_allclose(np.std(off_by, axis=0), each_axis(UNLIKE_EACH_OTHER), rtol=0.05)
-    assert np.all(np.abs(np.mean(off_by, axis=0)) < 4.0 * each_axis(UNLIKE_EACH_OTHER) / np.sqrt(4000))
+    off_by = errors(replace(Params(seed=5), **{f"{what}_noise": x for what, x in UNLIKE_EACH_OTHER.items()}), 2000)
+    np.testing.assert_allclose(np.std(off_by, axis=0), each_axis(UNLIKE_EACH_OTHER), rtol=0.07)
     correlation = np.corrcoef(np.transpose(off_by)) - np.eye(12)
-    assert np.max(np.abs(correlation)) < 0.07
+    assert np.max(np.abs(correlation)) < 0.1
     steps_apart = np.mean(off_by[1:] * off_by[:-1], axis=0) / np.var(off_by, axis=0)
-    assert np.max(np.abs(steps_apart)) < 0.07
+    assert np.max(np.abs(steps_apart)) < 0.1
 
 
 def test_noise_is_that_of_numpys_generator_by_the_seed():
@@ -91,8 +90,7 @@ def test_noise_is_that_of_numpys_generator_by_the_seed():
 def test_an_exact_estimate_is_the_truth_to_the_last_bit():
     for i, y in enumerate(courses(EXACT, 20)):
         u = truth(i * DT)
-        for name in ("p_WB", "v_WB", "w_WB"):
-            np.testing.assert_array_equal(getattr(y, f"{name}_meas"), getattr(u, name))
+        np.testing.assert_array_equal([y.p_WB_meas, y.v_WB_meas, y.w_WB_meas], [u.p_WB, u.v_WB, u.w_WB])
         np.testing.assert_allclose(y.q_WB_meas, u.q_WB, atol=1e-15)
 
 
@@ -100,37 +98,22 @@ def test_a_bias_is_constant_in_a_run_and_gaussian_over_the_seeds():
     biased = replace(EXACT, **{f"{what}_bias": x for what, x in UNLIKE_EACH_OTHER.items()})
     one_run = errors(replace(biased, seed=3), 50)
     np.testing.assert_allclose(one_run, np.tile(one_run[0], (51, 1)), atol=1e-15)
-    over_seeds = np.array(
-        [off(Navigation(replace(biased, seed=n)).outputs(0.0, truth(0.0)), truth(0.0)) for n in range(2000)]
-    )
-    np.testing.assert_allclose(np.std(over_seeds, axis=0), each_axis(UNLIKE_EACH_OTHER), rtol=0.07)
-    assert np.all(np.abs(np.mean(over_seeds, axis=0)) < 4.0 * each_axis(UNLIKE_EACH_OTHER) / np.sqrt(2000))
-    normal = over_seeds / each_axis(UNLIKE_EACH_OTHER)
-    assert np.mean(np.abs(normal) < 1.0) == pytest.approx(0.6827, abs=0.015)  # of a normal distribution
-    assert np.max(np.abs(np.corrcoef(np.transpose(normal)) - np.eye(12))) < 0.1
+    over_seeds = [off(Navigation(replace(biased, seed=n)).outputs(0.0, truth(0.0)), truth(0.0)) for n in range(600)]
+    normal = np.array(over_seeds) / each_axis(UNLIKE_EACH_OTHER)
+    np.testing.assert_allclose(np.std(normal, axis=0), 1.0, rtol=0.12)
+    assert np.all(np.abs(np.mean(normal, axis=0)) < 4.0 / np.sqrt(600))
+    assert np.mean(np.abs(normal) < 1.0) == pytest.approx(0.6827, abs=0.025)  # of a normal distribution
+    assert np.max(np.abs(np.corrcoef(np.transpose(normal)) - np.eye(12))) < 0.17
 
 
-@pytest.mark.slow
 def test_drift_is_stationary_from_the_start_and_forgets_in_its_correlation_time():
-    steps, lag = 125, 62  # 2 s, and some half of the correlation time
-    runs = np.array([errors(replace(DRIFTING, seed=n), steps) for n in range(400)]) / each_axis(UNLIKE_EACH_OTHER)
+    steps, lag = 25, 12  # 2 s, and some half of the correlation time
+    runs = np.array([errors(replace(DRIFTING, seed=n), steps, 5 * DT) for n in range(100)])
+    runs /= each_axis(UNLIKE_EACH_OTHER)
     for row in (0, lag, steps):
-        assert np.std(runs[:, row]) == pytest.approx(1.0, rel=0.04)
-    at_once, later = runs[:, : steps - lag], runs[:, lag:steps]
-    assert np.mean(at_once * later) == pytest.approx(np.exp(-lag * DT / 2.0), abs=0.05)
-    steps_of_it = np.diff(runs, axis=1)
-    assert np.std(steps_of_it) == pytest.approx(np.sqrt(2.0 * (1.0 - np.exp(-DT / 2.0))), rel=0.02)
-
-
-@pytest.mark.slow
-def test_drifts_statistics_do_not_depend_on_the_steps():
-    long, short = (
-        np.array([errors(replace(DRIFTING, seed=n), round(0.8 / dt), dt)[[0, -1], :3] for n in range(1500)])
-        for dt in (0.4, 0.1)
-    )
-    for runs in (long, short):
-        correlation = float(np.mean(runs[:, 0] * runs[:, 1])) / 0.001**2
-        assert correlation == pytest.approx(np.exp(-0.8 / 2.0), abs=0.05)
+        assert np.std(runs[:, row]) == pytest.approx(1.0, rel=0.08)
+    assert np.mean(runs[:, : steps - lag] * runs[:, lag:steps]) == pytest.approx(np.exp(-lag * 5 * DT / 2.0), abs=0.06)
+    assert np.std(np.diff(runs, axis=1)) == pytest.approx(np.sqrt(2.0 * (1.0 - np.exp(-5 * DT / 2.0))), rel=0.04)
 
 
 def test_bias_and_drift_do_not_change_the_noise():
@@ -141,11 +124,9 @@ def test_bias_and_drift_do_not_change_the_noise():
     assert np.std(together - noise) > 0.001
 
 
-@pytest.mark.parametrize(
-    ("delay", "dt"), [(0.016, 0.016), (0.05, 0.016), (0.0037, 0.016), (0.1, 0.016), (0.048, 0.002), (0.0037, 0.002)]
-)
+@pytest.mark.parametrize(("delay", "dt"), [(0.016, 0.016), (0.05, 0.016), (0.0037, 0.016), (0.0037, 0.002)])
 def test_a_delay_is_exact_on_a_ramp(delay: float, dt: float):
-    for i, y in enumerate(courses(replace(EXACT, delay=delay), 150, dt)):
+    for i, y in enumerate(courses(replace(EXACT, delay=delay), 60, dt)):
         np.testing.assert_allclose(off(y, truth(max(i * dt - delay, 0.0))), 0.0, atol=3e-8)
 
 
@@ -155,9 +136,9 @@ def test_a_delayed_estimate_keeps_the_quaternions_sign():
     assert min(y.q_WB_meas[0] for y in ys) < -0.99
 
 
-@pytest.mark.parametrize(("rate", "delay"), [(5.0, 0.0), (5.0, 0.13), (62.5, 0.0), (40.0, 0.05), (1000.0, 0.0)])
+@pytest.mark.parametrize(("rate", "delay"), [(5.0, 0.13), (62.5, 0.0), (40.0, 0.05), (1000.0, 0.0)])
 def test_an_estimate_is_held_between_updates(rate: float, delay: float):
-    for i, y in enumerate(courses(replace(EXACT, update_rate=rate, delay=delay), 300)):
+    for i, y in enumerate(courses(replace(EXACT, update_rate=rate, delay=delay), 100)):
         updated = np.floor(i * DT * rate + 1e-6) / rate
         np.testing.assert_allclose(off(y, truth(max(updated - delay, 0.0))), 0.0, atol=3e-8)
 
@@ -167,15 +148,8 @@ def test_a_held_estimate_has_one_noise():
     assert len(np.unique(ys, axis=0)) == 11  # one at the start, and ten in two seconds
 
 
-@pytest.mark.parametrize(
-    "p",
-    [
-        Params(seed=3),
-        replace(DRIFTING, seed=3, position_bias=0.01, position_noise=0.001),
-        replace(DRIFTING, seed=3, attitude_noise=0.002, update_rate=13.0, delay=0.1),
-    ],
-)
-def test_goes_on_bit_for_bit_after_a_state_is_restored_and_asking_for_outputs_changes_nothing(p: Params):
+def test_goes_on_bit_for_bit_after_a_state_is_restored_and_asking_for_outputs_changes_nothing():
+    p = replace(DRIFTING, seed=3, position_bias=0.01, attitude_noise=0.002, update_rate=13.0, delay=0.1)
     assert_continues(lambda: Navigation(p), lambda i: truth((i + 1) * DT), [5, 20], 40)
     asked, other = Navigation(p), Navigation(p)
     other.outputs(0.0, truth(0.0))
@@ -185,31 +159,24 @@ def test_goes_on_bit_for_bit_after_a_state_is_restored_and_asking_for_outputs_ch
         np.testing.assert_array_equal(flat(asked.step(i * DT, DT, after)), flat(other.step(i * DT, DT, after)))
 
 
-@pytest.mark.parametrize("name", ["noise", "bias", "drift"])
-def test_negative_deviations_are_refused_all_at_once(name: str):
-    negative: dict[str, Any] = {f"{what}_{name}": -0.001 for what in WHATS}
-    with pytest.raises(InvalidNavigationParameters) as refused:
-        Navigation(replace(EXACT, **negative))
-    assert [fault.partition(":")[0] for fault in refused.value.faults] == [*negative]
-
-
 @pytest.mark.parametrize(
     "changes",
     [
         {"delay": -0.1, "update_rate": -1.0, "attitude_bias": 3.0},
         {"delay": float("nan")},
         {"position_drift": 0.01},
+        *({f"{what}_{name}": -0.001 for what in WHATS} for name in ("noise", "bias", "drift")),
     ],
-    ids=["range", "nan", "drift"],
+    ids=["range", "nan", "drift", "negative noise", "negative bias", "negative drift"],
 )
-def test_what_no_navigation_has_is_refused(changes: dict[str, Any], wording: Wording):
+def test_what_no_navigation_has_is_refused_all_at_once(changes: dict[str, Any], wording: Wording):
     with pytest.raises(InvalidNavigationParameters) as refused:
-        Navigation(replace(Params(), **changes))
+        Navigation(replace(EXACT, **changes))
     assert len(refused.value.faults) == len(changes)
     wording.check(refused.value)
 
 
-@pytest.mark.parametrize("changes", [{}, {"delay": 0.1}, {"update_rate": 13.0}])
+@pytest.mark.parametrize("changes", [{}, {"delay": 0.1, "update_rate": 13.0}])
 def test_an_orientation_that_is_none_is_refused_by_name(changes: dict[str, Any], wording: Wording):
     unit, none = Navigation(replace(EXACT, **changes)), replace(truth(0.0), q_WB=np.zeros(4))
     with pytest.raises(NoOrientation) as refused:

@@ -58,18 +58,13 @@ def random_wrenches(count: int, size: float) -> Floats:
     return size * directions / np.linalg.norm(directions, axis=1, keepdims=True) * LIMITS
 
 
-def test_modules_are_each_other_turned_by_half_a_turn_about_z_and_blow_outwards():
+def test_modules_are_each_other_turned_about_z_blow_outwards_and_all_nozzles_of_an_axis_push_nowhere():
     turn = np.diag([-1.0, -1.0, 1.0])
     np.testing.assert_array_equal(P_BN[6:], P_BN[:6] @ turn)
     np.testing.assert_array_equal(DIRECTIONS[6:], DIRECTIONS[:6] @ turn)
     assert np.all(np.sum(P_BN * DIRECTIONS, axis=1) > 0.15)
-
-
-def test_four_nozzles_of_an_axis_together_push_nowhere():
     for axis in range(3):
-        np.testing.assert_allclose(
-            WRENCH_OF_THRUST @ np.equal(AXIS_OF_NOZZLE, axis).astype(np.float64), 0.0, atol=1e-15
-        )
+        np.testing.assert_allclose(WRENCH_OF_THRUST @ (np.array(AXIS_OF_NOZZLE) == axis), 0.0, atol=1e-15)
 
 
 def test_what_is_allocated_comes_out_again():
@@ -85,9 +80,9 @@ def test_what_is_allocated_comes_out_again():
     assert scaled < 150
 
 
-@pytest.mark.parametrize("size", [0.9, 3.0, 40.0])
+@pytest.mark.parametrize("size", [0.9, 40.0])
 def test_what_there_is_not_is_scaled_down_in_its_direction_until_a_nozzle_or_a_plenum_is_at_its_end(size: float):
-    for wrench in random_wrenches(50, size):
+    for wrench in random_wrenches(25, size):
         thrusts, less = NOZZLES.allocate(wrench)
         assert less
         angles = NOZZLES.angles(thrusts)
@@ -115,7 +110,7 @@ def _angles(wrench: Floats) -> Floats:
 
 
 def test_least_norm_allocation_needs_no_less_thrust_than_the_best_one_and_not_much_more():
-    for wrench in random_wrenches(30, 0.3):
+    for wrench in random_wrenches(10, 0.3):
         own = float(np.sum(NOZZLES.allocate(wrench)[0]))
         found: Any = linprog(np.ones(12), A_eq=WRENCH_OF_THRUST, b_eq=wrench)
         best = float(found.fun)
@@ -131,10 +126,9 @@ def test_the_mean_over_a_step_is_the_command_where_flappers_turn_at_once():
 
 def test_a_step_command_lags_by_about_the_flappers_lag():
     for axis in range(6):
-        for part in (0.01, 0.75):
-            wrench = part * LIMITS * np.eye(6)[axis]
-            lag = np.sum(1.0 - walk(thrusters(), wrench, 100, 0.005)[:, axis] / wrench[axis]) * 0.005
-            assert DEFAULT.flapper_lag * 0.8 < lag < DEFAULT.flapper_lag * 1.2
+        wrench = (0.01, 0.75)[axis % 2] * LIMITS * np.eye(6)[axis]
+        lag = np.sum(1.0 - walk(thrusters(), wrench, 60, 0.005)[:, axis] / wrench[axis]) * 0.005
+        assert DEFAULT.flapper_lag * 0.8 < lag < DEFAULT.flapper_lag * 1.2
 
 
 def test_flappers_turn_no_faster_than_their_rate():
@@ -145,18 +139,18 @@ def test_flappers_turn_no_faster_than_their_rate():
     np.testing.assert_allclose(angles[-1], _angles(np.array([0.5, 0.0, 0.2, 0.0, 0.01, 0.0])), atol=1e-4)
 
 
-@pytest.mark.parametrize("changes", [{}, {"flapper_rate": 3.0}, {"impeller_speed_0": 50.0, "delay": 0.024}])
+@pytest.mark.parametrize("changes", [{"flapper_rate": 3.0}, {"impeller_speed_0": 50.0, "delay": 0.024}])
 def test_the_whole_impulse_does_not_depend_on_the_step(changes: dict[str, float]):
     wrench = np.array([0.2, -0.1, 0.05, 0.01, -0.005, 0.01])
     fine, coarse = (
-        dt * np.sum(walk(thrusters(**changes), wrench, round(0.8 / dt), dt), axis=0) for dt in (0.001, 0.016)
+        dt * np.sum(walk(thrusters(**changes), wrench, round(0.8 / dt), dt), axis=0) for dt in (0.002, 0.016)
     )
     np.testing.assert_allclose(coarse, fine, atol=1e-5)
 
 
 def test_thrust_grows_with_the_square_of_the_impellers_speed_as_they_start():
     unit, wrench = thrusters(impeller_speed_0=0.0, impeller_lag=1.0, **AT_ONCE), np.array([0.3, 0, 0, 0, 0, 0.0])
-    walk(unit, wrench, 500, 0.001)
+    walk(unit, wrench, 100, 0.005)
     y = unit.step(0.5, 1e-6, command(wrench))
     share = 1.0 - np.exp(-0.5)
     np.testing.assert_allclose(y.impeller_speeds, DEFAULT.impeller_speed * share, rtol=1e-5)
@@ -193,8 +187,7 @@ def test_nozzles_whose_loss_takes_a_direction_away_are_refused_with_that_directi
     assert Thrusters(Params(flapper_range=share))
 
 
-@pytest.mark.parametrize("delay", [0.0, 0.025])
-def test_goes_on_bit_for_bit_after_a_state_is_restored(delay: float):
+def test_goes_on_bit_for_bit_after_a_state_is_restored():
     there, back = command(np.array([0.3, 0, 0, 0.01, 0, 0.0])), command(np.array([-0.4, 0.1, 0, 0, 0.02, 0.0]))
-    make = partial(thrusters, delay=delay, impeller_speed_0=100.0)
+    make = partial(thrusters, delay=0.025, impeller_speed_0=100.0)
     assert_continues(make, lambda n: there if n < 5 else back, [3, 5], 8)

@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from handover.cosim.blocks.ports import Floats
 from handover.plants.free_flyer.hand.hand_and_object import (
+    Activity,
     HandAndObject,
     Inputs,
     Motion,
@@ -82,6 +83,21 @@ class Scene(Steps):
     def go(self, seconds: float, dt: float = DT, **changes: Any) -> Outputs:
         """Go on with changed inputs."""
         return super().go(seconds, dt, **changes)
+
+
+def called(params: Params, activity: Activity = Activity.PULL, p_WG: Floats = PLACE) -> Scene:
+    """Return a scene in which the gripper holds the object and the called person has come to an activity."""
+    scene = Scene(params, p_WG)
+    scene.go(2.0, closure=1.0)
+    scene.until(activity, light=True)
+    return scene
+
+
+def giving(params: Params = GIVING, p_WG: Floats = PLACE) -> Scene:
+    """Return a scene in which the called person pushes towards the gripper."""
+    scene = Scene(params, p_WG)
+    scene.until(Activity.PUSH, light=True)
+    return scene
 
 
 def body_sums(mass: float, inertia: Floats, p: Floats, q: Floats, v: Floats, w: Floats) -> Floats:
