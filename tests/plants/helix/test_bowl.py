@@ -13,7 +13,7 @@ from handover.plants.helix.cameras.stereo_camera import Params as CameraParams
 from handover.plants.helix.cameras.stereo_camera import StereoCamera
 from handover.plants.helix.hand.bowl import Bowl
 from handover.plants.helix.hand.handover_partner import HandoverPartner
-from handover.plants.helix.hand.partner_parameters import Holder, Inputs, InvalidPartnerParameters, Outputs, Params
+from handover.plants.helix.hand.partner_parameters import Holder, Inputs, Outputs, Params
 
 P_WD = np.array([0.0, -0.16, -0.74])
 BOWL = Bowl(P_WD, radius=0.08, depth=0.06, ball_radius=0.025)
@@ -33,27 +33,20 @@ def dropped(beside: float, v: float = 0.0, dt: float = 0.02, **changes: Any) -> 
     return [partner.step(4.0 + i * dt, dt, Inputs(p_WG=p_WG + i * step, q_WG=DOWN, grip=0.0)) for i in range(1, 150)]
 
 
-@pytest.mark.parametrize("beside", [0.0, 0.03, -0.075])
+@pytest.mark.parametrize("beside", [0.0, -0.075])
 def test_a_ball_over_the_bowl_comes_to_rest_on_its_lowest_point(beside: float):
-    last = dropped(beside)[-1]
-    assert last.holder is Holder.FREE
+    ys = dropped(beside)
+    assert ys[-1].holder is Holder.FREE
     lowest = P_WD - np.array([0.0, 0.0, BOWL.depth - BOWL.ball_radius])
-    np.testing.assert_allclose(last.p_WO, lowest, atol=0.003)
-
-
-def test_a_ball_in_the_bowl_stays_within_its_surface_by_its_radius():
-    inside = [y.p_WO for y in dropped(0.07) if y.p_WO[2] < P_WD[2]]
+    np.testing.assert_allclose(ys[-1].p_WO, lowest, atol=0.003)
+    inside = [y.p_WO for y in ys if y.p_WO[2] < P_WD[2]]
     assert len(inside) > 20
     assert np.linalg.norm(inside - BOWL.p_WS, axis=1).max() <= BOWL.sphere_radius - BOWL.ball_radius + 1e-12
 
 
-@pytest.mark.parametrize(("beside", "v"), [(0.085, 0.0), (0.05, 0.4)])
-def test_a_ball_past_the_rim_falls_to_the_floor(beside: float, v: float):
-    assert dropped(beside, v)[-1].p_WO[2] == Params().floor
-
-
-def test_without_a_bowl_it_falls_to_the_floor():
-    assert dropped(0.0, bowl_radius=0.0)[-1].p_WO[2] == Params().floor
+@pytest.mark.parametrize(("beside", "v", "radius"), [(0.085, 0.0, 0.08), (0.05, 0.4, 0.08), (0.0, 0.0, 0.0)])
+def test_a_ball_past_the_rim_or_without_a_bowl_falls_to_the_floor(beside: float, v: float, radius: float):
+    assert dropped(beside, v, bowl_radius=radius)[-1].p_WO[2] == Params().floor
 
 
 def test_nothing_comes_in_from_below_or_past_the_rim():
@@ -76,15 +69,6 @@ def test_a_fall_crosses_the_rim_s_plane_on_the_line_between_two_places():
 def test_the_rim_lies_on_the_inner_surface():
     profile = BOWL.profile(9)
     np.testing.assert_allclose(profile[[0, -1]], [[0.0, P_WD[2] - BOWL.depth], [BOWL.radius, P_WD[2]]], atol=1e-12)
-
-
-def test_a_bowl_that_cannot_be_is_refused_with_all_that_is_wrong():
-    with pytest.raises(InvalidPartnerParameters) as told:
-        HandoverPartner(Params(bowl_radius=0.02, bowl_depth=0.5, p_WD=np.array([0.0, 0.0, -1.1])))
-    faults = "\n".join(told.value.faults)
-    assert "bowl_radius 0.02 m must exceed ball_radius 0.025 m" in faults
-    assert "bowl_depth 0.5 m must not exceed bowl_radius 0.02 m" in faults
-    assert "into the floor" in faults
 
 
 @pytest.mark.slow

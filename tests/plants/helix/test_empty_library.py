@@ -9,18 +9,16 @@ from pathlib import Path
 
 import lief
 import pytest
+from support.c_programs import compiled
 
-from handover.cosim.native_libraries import zig_cc
 from handover.fmus import interpreter
 from handover.fmus.build import cached
-from handover.fmus.compile import RUNTIME
 from handover.plants.helix.arm.empty_library import empty_library
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="Exudyn's wheel wants these libraries on Linux")
 
 ROOT = Path(__file__).parents[3]
 OF_A_SCREEN = ("libGL.so.1", "libX11.so.6")
-IMPORT_EXUDYN = "import exudyn"
 LOAD_ONE = """
 from handover.plants.helix.arm.empty_library import can_be_loaded, load_empty
 print(can_be_loaded("libof_nothing.so.7"))
@@ -64,27 +62,18 @@ def without_screen(tmp_path_factory: pytest.TempPathFactory) -> "list[str]":
 
 
 def call(*command: object, **environment: str) -> "subprocess.CompletedProcess[str]":
-    return subprocess.run(
-        [str(part) for part in command],
-        cwd=ROOT,
-        env={**os.environ, **environment},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        check=False,
-    )
+    env, one_stream = {**os.environ, **environment}, {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
+    return subprocess.run([str(part) for part in command], cwd=ROOT, env=env, text=True, check=False, **one_stream)
 
 
 @pytest.mark.parametrize(("machine", "arch"), [("x86_64", lief.ELF.ARCH.X86_64), ("aarch64", lief.ELF.ARCH.AARCH64)])
 def test_an_empty_library_is_a_library_of_its_name(machine: str, arch: lief.ELF.ARCH):
     library = lief.ELF.parse(list(empty_library("libGL.so.1", machine)))
     assert library is not None
-    assert library.header.machine_type == arch
-    assert library.header.file_type == lief.ELF.Header.FILE_TYPE.DYN
+    assert (library.header.machine_type, library.header.file_type) == (arch, lief.ELF.Header.FILE_TYPE.DYN)
     names = [entry.name for entry in library.dynamic_entries if isinstance(entry, lief.ELF.DynamicSharedObject)]
     assert names == ["libGL.so.1"]
-    assert [symbol.name for symbol in library.dynamic_symbols if symbol.name] == []
-    assert library.libraries == []
+    assert [symbol.name for symbol in library.dynamic_symbols if symbol.name] == library.libraries == []
     stack = library.get(lief.ELF.Segment.TYPE.GNU_STACK)
     assert stack is not None
     assert not stack.has(lief.ELF.Segment.FLAGS.X)
@@ -97,12 +86,8 @@ def test_it_counts_as_loaded_by_its_name():
 
 
 @pytest.mark.machine
-def test_exudyn_alone_wants_a_screen(without_screen: "list[str]"):
-    assert "libGL.so.1" in call(*without_screen, sys.executable, "-c", IMPORT_EXUDYN).stdout
-
-
-@pytest.mark.machine
-def test_without_a_screen_exudyn_is_loaded_and_its_windows_are_not(without_screen: "list[str]"):
+def test_without_a_screen_exudyn_is_loaded_which_alone_wants_one_and_its_windows_are_not(without_screen: "list[str]"):
+    assert "libGL.so.1" in call(*without_screen, sys.executable, "-c", "import exudyn").stdout
     assert call(*without_screen, sys.executable, "-c", COMPARE).stdout.split() == ["True", "False"]
 
 
@@ -112,37 +97,11 @@ def test_with_a_screen_the_real_libraries_are_taken():
     assert call(sys.executable, "-c", COMPARE).stdout.split() == ["True", "True"]
 
 
-@pytest.mark.slow
-def test_without_a_screen_an_arm_runs_to_the_same_bytes(without_screen: "list[str]", tmp_path: Path):
-    unit = cached("TendonArm", 2)
-    command = [
-        Path(sys.executable).with_name("handover"),
-        "run",
-        unit,
-        "--stop",
-        "0.2",
-        "--no-report",
-        "--isolate",
-        "all",
-    ]
-    for name, prefix in (("seen", []), ("blind", without_screen)):
-        done = call(*prefix, *command, "--out", tmp_path / name)
-        assert done.returncode == 0, done.stdout
-    seen, blind = ((tmp_path / name / "signals.parquet").read_bytes() for name in ("seen", "blind"))
-    assert seen == blind
-
-
 @pytest.mark.machine
-@pytest.mark.parametrize("own_process", ["0", "1"])
-def test_without_a_screen_an_arm_runs_in_a_host_that_is_not_python(
-    without_screen: "list[str]", own_process: str, tmp_path: Path
-):
-    if own_process == "0" and not interpreter.library():
-        pytest.skip("this Python has no shared library (Debian: libpython3.13, by its version)")
+def test_without_a_screen_an_arm_runs_in_a_host_that_is_not_python(without_screen: "list[str]", tmp_path: Path):
     with zipfile.ZipFile(cached("TendonArm", 2)) as archive:
         archive.extractall(tmp_path / "arm")
-    program = tmp_path / "c_host"
-    built = zig_cc(["-I", str(RUNTIME), str(ROOT / "docs" / "c_host" / "main.c"), "-o", str(program), "-ldl"])
-    assert built.returncode == 0, built.stdout
-    done = call(*without_screen, program, tmp_path / "arm", FMU_PYTHON_PROCESS=own_process)
-    assert "gripper at x = 0.0343 m, z = -0.6946 m" in done.stdout
+    program = compiled(ROOT / "docs" / "c_host" / "main.c")
+    for own_process in ("0", "1") if interpreter.library() else ("1",):  # else Python has no shared library
+        done = call(*without_screen, program, tmp_path / "arm", FMU_PYTHON_PROCESS=own_process)
+        assert "gripper at x = 0.0343 m, z = -0.6946 m" in done.stdout

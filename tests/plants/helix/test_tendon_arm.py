@@ -3,10 +3,9 @@ import math
 import numpy as np
 import pytest
 
-from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.ports import Floats
 from handover.plants.helix.arm.tendon_arm import TendonArm
-from handover.plants.helix.arm.tendon_parameters import InvalidArmParameters, Params
+from handover.plants.helix.arm.tendon_parameters import Params
 from handover.plants.helix.arm.tendon_ports import Inputs, Outputs
 
 CALIBRATED = np.repeat([0.12, 0.24, 0.24], 3)
@@ -47,10 +46,6 @@ def run(arm: TendonArm, u: Inputs, steps: int, dt: float = 0.02) -> Outputs:
     return y
 
 
-def flat(y: Outputs) -> Floats:
-    return np.concatenate([np.ravel(getattr(y, v.name)) for v in describe(TendonArm).outputs])
-
-
 def test_upper_tendons_carry_more_and_together_balance_weight_and_prestress():
     p = Params()
     tension = TendonArm(p).outputs(0.0, Inputs()).tension.reshape(3, 3)
@@ -68,9 +63,8 @@ def test_motors_do_not_yield_and_tendons_hold_the_length_against_a_downward_pull
     assert -0.7 - sunk == pytest.approx(np.sum(1.0 / stiffness), rel=0.06)
 
 
-@pytest.mark.parametrize("tendon", [4, *(pytest.param(t, marks=pytest.mark.slow) for t in (0, 8))])
-def test_a_shortened_tendon_bends_the_arm_towards_its_own_angle_in_the_base_frame(tendon: int):
-    dl_t = np.zeros(9)
+def test_a_shortened_tendon_bends_the_arm_towards_its_own_angle_in_the_base_frame():
+    tendon, dl_t = 4, np.zeros(9)
     dl_t[tendon] = -0.004
     p_BG = R_WB @ settled(Inputs(dl_t=dl_t), seconds=2.0).p_WG
     assert np.hypot(*p_BG[:2]) > 0.01
@@ -104,8 +98,7 @@ def test_discs_converge_quadratically_to_a_tip_error_below_a_millimetre():
 
 
 def test_a_small_force_moves_the_gripper_its_way_in_proportion():
-    one = settled(Inputs(f_G=np.array([0.0, 0.05, 0.0]))).p_WG
-    two = settled(Inputs(f_G=np.array([0.0, 0.10, 0.0]))).p_WG
+    one, two = (settled(Inputs(f_G=np.array([0.0, f, 0.0])), seconds=2.0).p_WG for f in (0.05, 0.1))
     assert one[1] > 1e-3
     assert abs(one[0]) < 1e-6
     assert two[1] == pytest.approx(2.0 * one[1], rel=0.02)
@@ -119,38 +112,26 @@ def test_a_persons_push_adds_to_what_else_pulls_at_the_gripper():
 
 @pytest.mark.slow
 def test_swinging_dies_out_and_faster_with_more_damping():
-    def swing(damping: float) -> tuple[float, float]:
+    rests: list[float] = []
+    for damping in (0.01, 0.06):
         arm = TendonArm(Params(damping=damping))
         run(arm, Inputs(f_G=np.array([0.0, 0.5, 0.0])), 10)
         y = [abs(float(arm.step(i * 0.02, 0.02, Inputs()).p_WG[1])) for i in range(100)]
-        return max(y[:50]), max(y[50:])
-
-    early_light, late_light = swing(0.01)
-    early_heavy, late_heavy = swing(0.06)
-    assert late_light < early_light
-    assert late_heavy / early_heavy < late_light / early_light
+        rests.append(max(y[50:]) / max(y[:50]))
+    assert rests[1] < rests[0] < 1.0
 
 
 def test_motors_follow_as_critically_damped_systems():
-    w = 2 * math.pi * 4.0
-    heavy = TendonArm(Params(gravity=0.0))
-    dl_t = np.full(9, -0.002)
-    y = run(heavy, Inputs(dl_t=dl_t), 4)
-    followed = 1 - (1 + w * 0.08) * math.exp(-w * 0.08)
-    assert (0.7 + y.p_WG[2]) / 0.006 == pytest.approx(followed, abs=0.03)
+    w, y = 2 * math.pi * 4.0, run(TendonArm(Params(gravity=0.0)), Inputs(dl_t=np.full(9, -0.002)), 4)
+    assert (0.7 + y.p_WG[2]) / 0.006 == pytest.approx(1 - (1 + w * 0.08) * math.exp(-w * 0.08), abs=0.03)
 
 
-@pytest.mark.parametrize("discs", [(1, 1, 1), (3, 5, 6), (12, 12, 12)])
-def test_backbone_has_25_points_whatever_the_disc_counts(discs: tuple[int, int, int]):
-    y = TendonArm(Params(discs_1=discs[0], discs_2=discs[1], discs_3=discs[2])).outputs(0.0, Inputs())
-    np.testing.assert_allclose(y.backbone, np.linspace([0, 0, 0], [0, 0, -0.6], 25), atol=1e-12)
+def test_backbone_has_25_points_whatever_the_disc_counts():
+    for n_1, n_2, n_3 in ((1, 1, 1), (3, 5, 6)):
+        y = TendonArm(Params(discs_1=n_1, discs_2=n_2, discs_3=n_3)).outputs(0.0, Inputs())
+        np.testing.assert_allclose(y.backbone, np.linspace([0, 0, 0], [0, 0, -0.6], 25), atol=1e-12)
 
 
 def test_one_long_step_is_the_same_as_short_ones():
     long, short = run(TendonArm(Params()), BENT, 1, dt=0.2), run(TendonArm(Params()), BENT, 10)
     np.testing.assert_allclose(long.p_WG, short.p_WG, atol=1e-4)
-
-
-def test_an_arm_with_slack_tendons_at_rest_is_refused():
-    with pytest.raises(InvalidArmParameters, match=r"^TendonArm: .* segment 2 would hang slack"):
-        TendonArm(Params(natural_length=np.array([0.14, 0.20, 0.262])))

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.restored_states import flat
 from support.wording import Wording
 
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.geometry import rotation_of
-from handover.cosim.blocks.ports import Floats
 from handover.plants.helix.arm.tendon_arm import TendonArm
 from handover.plants.helix.arm.tendon_arm_fast import TendonArmFast
 from handover.plants.helix.arm.tendon_parameters import InvalidArmParameters, Params
@@ -33,23 +33,17 @@ def run(arm: Arm, u: Inputs, steps: int, dt: float = 0.02) -> Outputs:
     return y
 
 
-def flat(y: Outputs) -> Floats:
-    return np.concatenate([np.ravel(getattr(y, v.name)) for v in describe(TendonArm).outputs])
-
-
 def test_they_have_the_same_ports_and_parameters():
     fast, arm = describe(TendonArmFast), describe(TendonArm)
-    assert repr(fast.inputs) == repr(arm.inputs)
-    assert repr(fast.outputs) == repr(arm.outputs)
-    assert repr(fast.parameters) == repr(arm.parameters)
+    for what in ("inputs", "outputs", "parameters"):
+        assert repr(getattr(fast, what)) == repr(getattr(arm, what))
 
 
 @both
 def test_hangs_straight_as_calibrated_and_stays(kind: type[Arm]):
     arm = kind(Params())
     start = arm.outputs(0.0, Inputs())
-    np.testing.assert_allclose(start.p_WR, [0.0, 0.0, -0.6], atol=1e-12)
-    np.testing.assert_allclose(start.p_WG, [0.0, 0.0, -0.7], atol=1e-12)
+    np.testing.assert_allclose([start.p_WR, start.p_WG], [[0.0, 0.0, -0.6], [0.0, 0.0, -0.7]], atol=1e-12)
     np.testing.assert_allclose(start.q_WR, [0.0, 1.0, 0.0, 0.0], atol=1e-12)
     np.testing.assert_allclose(start.backbone, np.linspace([0, 0, 0], [0, 0, -0.6], 25), atol=1e-12)
     np.testing.assert_allclose(flat(run(arm, Inputs(), 50)), flat(start), atol=1e-9)
@@ -76,36 +70,20 @@ def test_gripper_closes_at_a_limited_rate_and_opens_again(kind: type[Arm]):
 
 
 @both
-def test_outputs_take_no_time(kind: type[Arm]):
-    arm = kind(Params())
-    run(arm, BENT, 3)
-    before = arm.get_state()
-    first = flat(arm.outputs(0.06, BENT))
-    np.testing.assert_array_equal(flat(arm.outputs(0.06, Inputs())), first)
-    assert arm.get_state() == before
-
-
-@both
-def test_continues_bit_for_bit_from_a_state_here_and_in_another_arm(kind: type[Arm]):
-    arm = kind(Params())
+def test_continues_bit_for_bit_from_a_state_here_and_in_another_arm_at_another_time(kind: type[Arm]):
+    arm, other = kind(Params()), kind(Params())
     run(arm, BENT, 7)
     state, there = arm.get_state(), flat(arm.outputs(0.0, BENT))
-    first = flat(run(arm, PULLED, 12))
-    other = kind(Params())
+    np.testing.assert_array_equal(flat(arm.outputs(0.06, Inputs())), there)  # outputs take no time
+    assert arm.get_state() == state
     run(other, Inputs(dl_t=np.full(9, 0.001)), 3)
-    for one in (arm, other, kind(Params())):
-        one.set_state(state)
-        assert one.get_state() == state
-        np.testing.assert_array_equal(flat(one.outputs(0.0, BENT)), there)
-        np.testing.assert_array_equal(flat(run(one, PULLED, 12)), first)
-
-
-@both
-def test_interleaved_arms_and_another_starting_time_give_the_same_bits(kind: type[Arm]):
-    a, b = kind(Params()), kind(Params())
-    for i in range(10):
-        y_a, y_b = a.step(i * 0.02, 0.02, BENT), b.step(100.0 + i * 0.02, 0.02, BENT)
-        np.testing.assert_array_equal(flat(y_a), flat(y_b))
+    first = [flat(arm.step(i * 0.02, 0.02, PULLED)) for i in range(8)]
+    arm.set_state(state)
+    other.set_state(state)
+    assert other.get_state() == state
+    for i in range(8):
+        for one, begin in ((arm, 0.0), (other, 100.0)):
+            np.testing.assert_array_equal(flat(one.step(begin + i * 0.02, 0.02, PULLED)), first[i])
 
 
 SCRIPT = """
@@ -121,7 +99,7 @@ print(*y.p_WG, hashlib.sha256(arm.get_state()).hexdigest())
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("kind", "compiled"), [(TendonArm, True), (TendonArmFast, True), (TendonArmFast, False)])
+@pytest.mark.parametrize(("kind", "compiled"), [(TendonArm, True), (TendonArmFast, False)])
 def test_says_nothing_leaves_no_file_and_gives_the_same_in_another_process(
     kind: type[Arm], compiled: bool, tmp_path: Path
 ):
@@ -137,33 +115,33 @@ def test_says_nothing_leaves_no_file_and_gives_the_same_in_another_process(
     assert list(tmp_path.iterdir()) == []
 
 
-@both
-def test_a_step_that_does_not_fit_is_refused_with_those_that_would(kind: type[Arm], wording: Wording):
-    with pytest.raises(StepSizeError) as caught:
-        kind(Params()).step(0.0, 0.012, Inputs())
-    assert (caught.value.dt, caught.value.internal_step) == (0.012, 0.005)
-    wording.check(caught.value)
-
-
 @pytest.mark.parametrize(
     ("kind", "force"), [(TendonArm, 1e9), *((TendonArmFast, force) for force in (1e9, math.inf, math.nan))]
 )
 def test_failure_names_the_time_and_leaves_the_arm_where_it_was(kind: type[Arm], force: float):
     arm = kind(Params())
     before = arm.get_state()
-    with pytest.raises(SolverFailure, match=rf"^{kind.__name__}: no solution at t = 3[.\d]* s") as caught:
+    with pytest.raises(SolverFailure) as caught:
         arm.step(3.0, 0.02, Inputs(f_G=np.array([force, 0.0, 0.0])))
+    assert str(caught.value).startswith(kind.__name__)
     assert 3.0 <= caught.value.time <= 3.02
     assert arm.get_state() == before
     np.testing.assert_array_equal(flat(arm.step(3.0, 0.02, BENT)), flat(kind(Params()).step(3.0, 0.02, BENT)))
 
 
 @both
-def test_bad_parameters_are_refused_all_at_once(kind: type[Arm], wording: Wording):
+def test_bad_parameters_are_refused_all_at_once_and_a_step_with_those_that_would_fit(kind: type[Arm], wording: Wording):
     with pytest.raises(InvalidArmParameters) as caught:
         kind(Params(discs_1=0, EA=-1.0, natural_length=np.array([0.14, math.nan, 0.262])))
     assert len(caught.value.faults) == 3
     wording.check(caught.value)
+    with pytest.raises(InvalidArmParameters) as caught:
+        kind(Params(natural_length=np.array([0.14, 0.20, 0.262])))  # slack tendons at rest
+    wording.check(caught.value)
+    with pytest.raises(StepSizeError) as refused:
+        kind(Params()).step(0.0, 0.012, Inputs())
+    assert (refused.value.dt, refused.value.internal_step) == (0.012, 0.005)
+    wording.check(refused.value)
 
 
 @both

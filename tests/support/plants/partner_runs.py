@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.ports import Floats
 from handover.plants.helix.hand.handover_partner import HandoverPartner
 from handover.plants.helix.hand.partner_parameters import Inputs, Outputs, Params
@@ -24,10 +23,6 @@ def beside(x: float, y: float, z: float) -> Floats:
 
 def inputs(p_WG: Floats = P_WO, grip: float = 1.0, turn: Rotation = DOWN) -> Inputs:
     return Inputs(p_WG=p_WG, q_WG=turn.as_quat(scalar_first=True), grip=grip)
-
-
-def flat(y: Outputs) -> Floats:
-    return np.concatenate([np.ravel(getattr(y, v.name)) for v in describe(HandoverPartner).outputs])
 
 
 def walk(partner: HandoverPartner, u: Inputs, steps: int, dt: float = 0.02) -> list[Outputs]:
