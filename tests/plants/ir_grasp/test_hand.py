@@ -61,23 +61,12 @@ def test_sensors_lie_on_the_pads_and_look_square_to_them_inwards():
     assert max(directions[1:, 1]) < 0.0
 
 
-def test_pads_come_together_with_the_closure_and_the_index_lags():
-    pads = np.array([sensor_rays(ORIGIN, 0.0, resting_posture(s, 400.0, 0.094))[0] for s in np.linspace(0.0, 0.4, 9)])
-    assert np.all(np.diff(pads[:, 0, 1]) > 0.0)
-    assert np.all(np.diff(pads[:, 1:, 1], axis=0) < 0.0)
-    assert np.all(pads[:, 1, 1] > pads[:, 2, 1] + 0.01)
-
-
-@pytest.mark.parametrize("sigma", [0.0, 0.2, 0.5, 0.9])
-def test_free_posture_balances_tendon_and_springs(sigma: float):
+@pytest.mark.parametrize("sigma", [0.0, 0.5])
+def test_free_posture_balances_tendon_and_springs_up_to_the_joints_limits(sigma: float):
     q = resting_posture(sigma, 400.0, 0.094)
     T = sigma * 0.094 / (1.0 / 400.0 + float(np.sum(PULLEYS**2 / STIFFNESS)))
     np.testing.assert_allclose(q, PULLEYS * T / STIFFNESS, atol=1e-12)
-
-
-def test_free_posture_stops_at_the_joints_limits():
-    q = resting_posture(1.0, 2000.0, 0.3)
-    assert np.max(q) == 1.6
+    assert np.max(resting_posture(1.0, 2000.0, 0.3)) == 1.6
 
 
 def test_tendon_taken_up_is_the_sum_over_the_joints():

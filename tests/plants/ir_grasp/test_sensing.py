@@ -1,10 +1,13 @@
 """What disturbs readings and encoders: tolerances, ambient light, cross-talk, gloss, faces, fingers, other objects."""
 
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
+from support.restored_states import assert_continues
+from support.wording import Wording
 
 from handover.cosim.blocks.ports import Floats
 from handover.plants.ir_grasp.actuation import PULLEYS, STIFFNESS
@@ -67,42 +70,33 @@ def test_a_sensor_whose_curve_does_not_reach_so_near_saturates():
     assert np.max(ticks(p, p_WH_0=np.array([-0.11, 0.0]), reflectivity=2.0)) == 4095
 
 
-def test_constants_that_are_not_monotonic_are_refused_by_finger():
-    with pytest.raises(InvalidSceneParameters, match="must fall from 0 to 4095 ticks"):
-        GraspScene(replace(QUIET, d=0.00043))
-    with pytest.raises(InvalidSceneParameters, match=r"must fall from 0 to 4095 ticks; it does not at 0 ticks"):
-        GraspScene(replace(QUIET, a=-0.02, c=0.1))
+def test_constants_that_are_not_monotonic_are_refused_by_finger(wording: Wording):
     falling = replace(QUIET, a=-0.001, c=0.0665, d=-0.00069)
     GraspScene(falling)  # one that falls although a is below 0
     index = np.array([1.0, 5.0, 1.0])
-    with pytest.raises(InvalidSceneParameters, match=r"index, with its scales and tolerance: .* must fall"):
-        GraspScene(replace(falling, a_scale=index, b_scale=index))
+    rising = replace(QUIET, d=0.00043), replace(QUIET, a=-0.02, c=0.1), replace(falling, a_scale=index, b_scale=index)
+    for p in rising:
+        with pytest.raises(InvalidSceneParameters) as refused:
+            GraspScene(p)
+        wording.check(refused.value)
 
 
-def test_ambient_light_adds_to_readings():
-    np.testing.assert_array_equal(ticks(QUIET, ambient=120.0), ticks(QUIET) + 120.0)
-
-
-def test_one_sensor_at_a_time_has_no_crosstalk_and_more_have():
+def test_ambient_light_adds_crosstalk_too_if_several_are_active_and_a_face_has_its_own_reflectivity():
     own = ticks(SQUARE)
+    np.testing.assert_array_equal(ticks(SQUARE, ambient=120.0), own + 120.0)
     np.testing.assert_array_equal(ticks(SQUARE, crosstalk=0.5), own)
     all_active = ticks(SQUARE, active=3, crosstalk=0.2)
     np.testing.assert_allclose(all_active, own + 0.2 * (own.sum() - own), atol=0.8)
-    np.testing.assert_array_equal(ticks(SQUARE, active=3, crosstalk=0.0), own)
+    faces = np.array([0.5, 1.0, 0.25, 1.0, 1.0, 1.0, 1.0, 1.0])  # at -y, where the thumb looks, and at y
+    np.testing.assert_allclose(ticks(SQUARE, face_reflectivity=faces), own * [0.5, 0.25, 0.25], atol=0.8)
 
 
 def test_sensors_that_are_active_together_are_read_together():
-    def changed(active: int) -> list[tuple[int, ...]]:
+    for active, found in ((2, [[0, 1], [0, 2], [1, 2]]), (3, [[0, 1, 2]] * 3)):
         scene = GraspScene(replace(QUIET, noise=200.0, active=active))
-        last, found = scene.outputs(0.0, Inputs()).ticks, list[tuple[int, ...]]()
-        for k in range(9):
-            y = scene.step(k * 5e-3, 5e-3, Inputs(p_WH_cmd=QUIET.p_WH_0, sigma_cmd=QUIET.sigma_0))
-            found.append(tuple(np.flatnonzero(y.ticks != last).tolist()))
-            last = y.ticks
-        return found
-
-    assert changed(2)[:3] == [(0, 1), (0, 2), (1, 2)]
-    assert changed(3) == [(0, 1, 2)] * 9
+        u = Inputs(p_WH_cmd=QUIET.p_WH_0, sigma_cmd=QUIET.sigma_0)
+        read = [scene.outputs(0.0, u).ticks, *(scene.step(k * 5e-3, 5e-3, u).ticks for k in range(3))]
+        assert [np.flatnonzero(b != a).tolist() for a, b in pairwise(read)] == found
 
 
 def test_a_glossy_object_is_brighter_where_it_is_met_squarely_and_darker_aslant():
@@ -115,11 +109,6 @@ def test_a_glossy_object_is_brighter_where_it_is_met_squarely_and_darker_aslant(
     np.testing.assert_allclose(ticks(SQUARE, gloss=0.9, gloss_exponent=40.0), wanted, atol=0.51)
     assert SQUARE.sensor().ticks(0.02, 1.0, 1.0, 0.9, 40.0) == pytest.approx(SQUARE.sensor().ticks(0.02, 1.0, 1.0))
     assert SQUARE.sensor().ticks(0.02, 0.3, 1.0, 1.0, 40.0) == 0.0
-
-
-def test_a_face_has_its_own_reflectivity():
-    faces = np.array([0.5, 1.0, 0.25, 1.0, 1.0, 1.0, 1.0, 1.0])  # at -y, where the thumb looks, and at y
-    np.testing.assert_allclose(ticks(SQUARE, face_reflectivity=faces), ticks(SQUARE) * [0.5, 0.25, 0.25], atol=0.8)
 
 
 def test_fingers_that_are_seen_stand_in_each_others_light():
@@ -151,22 +140,21 @@ def test_a_second_object_is_seen_and_hides_the_first():
 def test_sensors_have_noise_of_their_own_and_the_truth_has_none():
     alone = replace(QUIET, wrist_noise=1e-3, noise=3.0, ambient_noise=4.0, mass_O=5.0)
     p = replace(alone, heading_noise=0.02, closure_noise=0.01, joint_noise=0.02, tension_noise=0.3)
-    ys = course(p, 9.0)
+    ys = course(p, 6.0)
     off = [(y.p_WH_meas - y.p_WH, y.yaw_meas - y.yaw, y.sigma_meas - y.sigma, y.q_meas - y.q) for y in ys]
     errors = np.array([np.hstack([*o, y.tension_meas - y.tension]) for o, y in zip(off, ys, strict=True)])
     deviations = [1e-3, 1e-3, 0.02, 0.01, *[0.02] * 8, 0.3]
-    np.testing.assert_allclose(np.std(errors, axis=0), deviations, rtol=0.12)
-    np.testing.assert_array_less(np.abs(np.mean(errors, axis=0)), 0.15 * np.array(deviations))
+    np.testing.assert_allclose(np.std(errors, axis=0), deviations, rtol=0.14)
+    np.testing.assert_array_less(np.abs(np.mean(errors, axis=0)), 0.18 * np.array(deviations))
     shares = errors / np.std(errors, axis=0)
-    assert np.max(np.abs(shares.T @ shares / len(ys) - np.eye(13))) < 0.2
-    np.testing.assert_allclose(np.std([y.ticks for y in ys], axis=0), 5.0, rtol=0.1)
-    for y, z in zip(ys, course(alone, 3.0), strict=False):
-        np.testing.assert_array_equal(y.ticks, z.ticks)  # no other random numbers for what both have
-        np.testing.assert_array_equal(y.p_WH_meas, z.p_WH_meas)
-        np.testing.assert_array_equal(y.q, z.q)
+    assert np.max(np.abs(shares.T @ shares / len(ys) - np.eye(13))) < 0.22
+    np.testing.assert_allclose(np.std([y.ticks for y in ys], axis=0), 5.0, rtol=0.12)
+    for y, z in zip(ys, course(alone, 1.0), strict=False):
+        for name in ("ticks", "p_WH_meas", "q"):  # no other random numbers for what both have
+            np.testing.assert_array_equal(getattr(y, name), getattr(z, name))
         np.testing.assert_array_equal(z.q_meas, z.q)
         assert (z.yaw_meas, z.sigma_meas, z.tension_meas) == (z.yaw, z.sigma, z.tension)
-    for z in course(replace(QUIET, mass_O=5.0), 0.3):
+    for z in course(replace(QUIET, mass_O=5.0), 0.15):
         np.testing.assert_array_equal(z.p_WH_meas, z.p_WH)
 
 
@@ -182,29 +170,20 @@ def test_joints_are_off_their_design_by_a_tolerance_drawn_once():
 
 
 def test_a_state_with_all_that_moves_and_disturbs_is_complete():
-    p = replace(
-        QUIET, thing=Thing.BAR, bar_size=np.array([0.03, 0.11]), noise=5.0, ambient_noise=3.0, ambient=40.0, active=2
-    )
+    noises: dict[str, float] = {"noise": 5.0, "ambient_noise": 3.0, "wrist_noise": 1e-3, "heading_noise": 0.01}
+    noises |= {"closure_noise": 0.01, "joint_noise": 0.01, "tension_noise": 0.1, "stiffness_tolerance": 0.02}
+    p = replace(QUIET, thing=Thing.BAR, bar_size=np.array([0.03, 0.11]), ambient=40.0, active=2, **noises)
     p = replace(p, p_WH_0=np.array([-0.27, 0.0]), other_radius=0.02, p_WX_0=np.array([0.0, 0.085]))
     p = replace(p, carry_velocity=np.array([-0.01, 0.02]), carry_until=1.5, nudge=np.array([0.0, 0.02]), nudge_time=0.9)
-    p = replace(p, wrist_noise=1e-3, heading_noise=0.01, closure_noise=0.01, fingers_seen=True, sensor_tolerance=0.1)
-    p = replace(p, joint_noise=0.01, tension_noise=0.1, stiffness_tolerance=0.02)
-    scene, other = GraspScene(p), GraspScene(p)
+    p = replace(p, fingers_seen=True, sensor_tolerance=0.1)
 
     def command(k: int) -> Inputs:
         return Inputs(p_WH_cmd=np.array([-0.27 + 0.002 * min(k, 70), 0.0]), sigma_cmd=min(1.0, 0.01 * k))
 
-    for k in range(77):
-        scene.step(k * STEP, STEP, command(k))
-    other.set_state(scene.get_state())
-    assert other.get_state() == scene.get_state()
-    moved = False
-    for k in range(77, 160):
-        y, z = (s.step(k * STEP, STEP, command(k)) for s in (scene, other))
-        for name in vars(y):
-            np.testing.assert_array_equal(getattr(y, name), getattr(z, name), err_msg=name)
-        moved = moved or bool(np.linalg.norm(y.p_WX - p.p_WX_0) > 1e-3)
-    assert moved
+    scene = GraspScene(p)
+    end = [scene.step(k * STEP, STEP, command(k)) for k in range(137)][-1]
+    assert np.linalg.norm(end.p_WX - p.p_WX_0) > 1e-3
+    assert_continues(lambda: GraspScene(p), command, [30, 77], 60, STEP)
 
 
 def test_by_default_a_reading_is_the_sensors_law_and_one_random_number():

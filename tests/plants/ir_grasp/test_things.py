@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.wording import Wording
 
 from handover.cosim.blocks.ports import Floats
 from handover.plants.ir_grasp.objects import (
@@ -38,19 +39,15 @@ def test_a_disc_like_the_cylinder_moves_like_it():
     own = SOLIDS[Thing.CYLINDER]
     disc = replace(AROUND, thing=Thing.DISC, mass_O=own.mass, reflectivity=own.reflectivity)
     u = Inputs(p_WH_cmd=np.array([-0.15, 0.01]), sigma_cmd=0.9)
-    for a, b in zip(course(AROUND, u, 1.5), course(disc, u, 1.5), strict=True):
-        np.testing.assert_array_equal(a.p_WO, b.p_WO)
-        np.testing.assert_array_equal(a.ticks, b.ticks)
+    a, b = course(AROUND, u, 1.0)[-1], course(disc, u, 1.0)[-1]
+    np.testing.assert_array_equal([*a.p_WO, *a.ticks], [*b.p_WO, *b.ticks])
 
 
 def test_a_bar_like_the_box_moves_like_it_and_so_does_a_polygon_nearly():
-    own = SOLIDS[Thing.PAPER_BOX_A]
+    own, x, y = SOLIDS[Thing.PAPER_BOX_A], 0.0375, 0.025
     box = replace(AROUND, thing=Thing.PAPER_BOX_A, mass_O=own.mass, reflectivity=own.reflectivity)
-    bar = replace(box, thing=Thing.BAR, bar_size=np.array([0.075, 0.05]))
-    corners = (
-        np.vstack([np.array(own.parts[0].corners), np.zeros((4, 2))]) if isinstance(own.parts[0], Rectangle) else None
-    )
-    assert corners is not None
+    bar, corners = replace(box, thing=Thing.BAR, bar_size=np.array([2 * x, 2 * y])), np.zeros((8, 2))
+    corners[:4] = [(-x, -y), (x, -y), (x, y), (-x, y)]
     polygon = replace(box, thing=Thing.POLYGON, corners=corners, corner_count=4)
     u = Inputs(p_WH_cmd=np.array([-0.15, 0.01]), sigma_cmd=0.9)
     ends = [course(p, u, 1.5)[-1] for p in (box, bar, polygon)]
@@ -59,12 +56,10 @@ def test_a_bar_like_the_box_moves_like_it_and_so_does_a_polygon_nearly():
     np.testing.assert_allclose(ends[0].p_WO, ends[2].p_WO, atol=1e-3)
 
 
-def test_fingers_reach_into_a_dent():
-    scene = GraspScene(replace(AWAY, thing=Thing.POLYGON, corners=L_SHAPE, corner_count=6))
-    assert scene.outputs(0.0, Inputs()).touching == 0
+def test_a_second_object_may_stand_in_a_dent():
     inside = replace(AWAY, thing=Thing.POLYGON, corners=L_SHAPE, corner_count=6, other_radius=0.015)
     GraspScene(replace(inside, p_WX_0=np.array([0.008, 0.008])))
-    with pytest.raises(InvalidSceneParameters, match="object by"):
+    with pytest.raises(InvalidSceneParameters):
         GraspScene(replace(inside, p_WX_0=np.array([-0.02, 0.008])))
 
 
@@ -113,9 +108,9 @@ def test_mass_follows_from_the_area_unless_given():
 
 
 def test_the_family_is_in_its_ranges_and_half_of_it_is_held_out():
-    solids = [drawn_solid(seed) for seed in range(300)]
+    solids = [drawn_solid(seed) for seed in range(200)]
     kinds = [type(s.parts[0]) for s in solids]
-    assert all(kinds.count(kind) > 70 for kind in (Disc, Rectangle, Polygon))
+    assert all(kinds.count(kind) > 45 for kind in (Disc, Rectangle, Polygon))
     for s in solids:
         assert 0.05 <= s.mass <= 0.3
         assert 0.3 <= s.reflectivity <= 1.5
@@ -124,35 +119,30 @@ def test_the_family_is_in_its_ranges_and_half_of_it_is_held_out():
         assert np.all(np.abs(s.mass_offset) <= 0.005)
     assert drawn_solid(7) == drawn_solid(7) != drawn_solid(8)
     assert [is_held_out(seed) for seed in range(4)] == [False, True, False, True]
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_a_drawn_object_stands_on_the_table(seed: int):
-    scene = GraspScene(replace(AWAY, thing=Thing.DRAWN, thing_seed=seed))
-    y = scene.outputs(0.0, Inputs())
-    assert y.yaw_O == pytest.approx(drawn_solid(seed).yaw)
-    (outline,) = placed(drawn_solid(seed), y.p_WO, y.yaw_O)
+    y = GraspScene(replace(AWAY, thing=Thing.DRAWN, thing_seed=5)).outputs(0.0, Inputs())
+    assert y.yaw_O == pytest.approx(drawn_solid(5).yaw)
+    (outline,) = placed(drawn_solid(5), y.p_WO, y.yaw_O)
     assert np.max(np.abs(outline)) < 0.06
 
 
-REFUSED: list[tuple[dict[str, Any], str]] = [
-    ({"thing": Thing.POLYGON, "corners": L_SHAPE[[0, 2, 1, 3, 4, 5, 6, 7]], "corner_count": 6}, "corners: edge 0"),
-    ({"thing": Thing.POLYGON, "corners": L_SHAPE, "corner_count": 7}, r"corners: edge .* cross or touch"),
-    ({"thing": Thing.POLYGON, "corners": L_SHAPE[::-1].copy(), "corner_count": 8}, "corners: edge 0"),
-    ({"thing": Thing.DISC, "disc_radius": 0.001}, "disc_radius"),
-    ({"thing": 9}, "thing"),
-    ({"thing": -1}, "thing"),
-    ({"thing": Thing.BAR, "mass_offset": np.array([0.0, 0.02])}, "mass_offset .* outside it"),
-    ({"p_WO_0": np.array([0.0, 0.43])}, "the cylinder stands out 13 mm beyond the table"),
-    ({"other_radius": 0.03, "p_WX_0": np.array([0.0, 0.44])}, "the second object stands out 20 mm beyond"),
-    ({"other_radius": 0.03, "p_WX_0": np.array([0.05, 0.0])}, "second object would start in .*: object by 13 mm"),
-    ({"other_radius": 0.03, "p_WX_0": np.array([-0.11, 0.0])}, "second object would start in .*: palm by"),
-    ({"carry_velocity": np.array([0.0, 0.03]), "carry_until": 20.0}, r"carried to \[0.000, 0.600\] m: the cylinder"),
-    ({"p_WH_0": np.array([-0.07, 0.0])}, "the hand would start in the object: palm by 19 mm"),
-]
+REFUSED: dict[str, dict[str, Any]] = {
+    "crossing edges": {"thing": Thing.POLYGON, "corners": L_SHAPE[[0, 2, 1, 3, 4, 5, 6, 7]], "corner_count": 6},
+    "too many corners": {"thing": Thing.POLYGON, "corners": L_SHAPE, "corner_count": 7},
+    "disc": {"thing": Thing.DISC, "disc_radius": 0.001},
+    "thing": {"thing": 9},
+    "negative thing": {"thing": -1},
+    "mass outside": {"thing": Thing.BAR, "mass_offset": np.array([0.0, 0.02])},
+    "beyond the table": {"p_WO_0": np.array([0.0, 0.43])},
+    "second beyond": {"other_radius": 0.03, "p_WX_0": np.array([0.0, 0.44])},
+    "second in the object": {"other_radius": 0.03, "p_WX_0": np.array([0.05, 0.0])},
+    "second in the palm": {"other_radius": 0.03, "p_WX_0": np.array([-0.11, 0.0])},
+    "carried beyond": {"carry_velocity": np.array([0.0, 0.03]), "carry_until": 20.0},
+    "hand in the object": {"p_WH_0": np.array([-0.07, 0.0])},
+}
 
 
-@pytest.mark.parametrize(("changes", "fault"), REFUSED)
-def test_a_scene_that_cannot_be_is_refused_with_the_reason(changes: dict[str, Any], fault: str):
-    with pytest.raises(InvalidSceneParameters, match=fault):
+@pytest.mark.parametrize("changes", REFUSED.values(), ids=list(REFUSED))
+def test_a_scene_that_cannot_be_is_refused_with_the_reason(changes: dict[str, Any], wording: Wording):
+    with pytest.raises(InvalidSceneParameters) as refused:
         GraspScene(replace(AROUND, **changes))
+    wording.check(refused.value)

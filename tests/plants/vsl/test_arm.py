@@ -1,13 +1,12 @@
-import itertools
 import math
-from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from support.restored_states import assert_continues, assert_outputs_change_nothing, flat
+from support.wording import Wording
 
-from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.ports import Floats
 from handover.plants.vsl.arm import Inputs as ArmInputs
 from handover.plants.vsl.arm import InvalidInput, VslArm
@@ -48,10 +47,6 @@ def tip_error(p_WG: tuple[float, float, float], pressure: float, load: float, pa
     return 1e3 * float(np.linalg.norm(y.p_WG - stiff(y.q_meas)))
 
 
-def flat(y: ArmOutputs) -> Floats:
-    return np.concatenate([np.ravel(getattr(y, v.name)) for v in describe(VslArm).outputs])
-
-
 def walk(arm: VslArm, u: ArmInputs, steps: int, dt: float = 0.02) -> list[ArmOutputs]:
     return [arm.step(i * dt, dt, u) for i in range(steps)]
 
@@ -59,28 +54,21 @@ def walk(arm: VslArm, u: ArmInputs, steps: int, dt: float = 0.02) -> list[ArmOut
 OUT = (0.4, 0.0, 0.15)
 
 
-@pytest.mark.parametrize(("pressure", "load", "wanted"), [(0.5e5, 0.0, 34.9), (0.5e5, 0.1, 52.8), (2.0e5, 0.1, 24.1)])
-def test_the_tip_errs_as_much_as_it_was_measured_to(pressure: float, load: float, wanted: float):
-    assert tip_error(OUT, pressure, load) == pytest.approx(wanted, rel=0.01)
+@pytest.mark.parametrize(
+    ("params", "pressure", "load", "wanted"),
+    [(EXACT, 0.5e5, 0.0, 34.9), (EXACT, 2.0e5, 0.1, 24.1), (PRINTED, 1e5, 0.0, 3.2), (PRINTED, 1e5, 0.1, 4.7)],
+)
+def test_the_tip_errs_as_much_as_it_was_measured_to(params: Params, pressure: float, load: float, wanted: float):
+    assert tip_error(OUT, pressure, load, params) == pytest.approx(wanted, rel=0.01 if params is EXACT else 0.05)
 
 
-def test_a_printed_arm_errs_by_a_few_millimetres():
-    assert tip_error(OUT, 1e5, 0.0, PRINTED) == pytest.approx(3.2, rel=0.05)
-    assert tip_error(OUT, 1e5, 0.1, PRINTED) == pytest.approx(4.7, rel=0.05)
-
-
-@pytest.mark.parametrize("place", [(0.3, 0.0, 0.05), (0.3, 0.0, 0.35), (0.4, 0.0, 0.15), (0.25, 0.0, 0.1)])
-def test_error_grows_with_load_and_falls_with_pressure(place: tuple[float, float, float]):
-    loads, pressures = [0.0, 0.025, 0.05, 0.075, 0.1], [0.5e5, 1e5, 1.5e5, 2e5]
+def test_error_grows_with_load_and_reach_and_falls_with_pressure():
+    place, loads, pressures = (0.25, 0.0, 0.1), [0.0, 0.05, 0.1], [0.5e5, 1e5, 2e5]
     errors = np.array([[tip_error(place, p, m) for p in pressures] for m in loads])
     assert np.all(np.diff(errors, axis=0) > 0.2)
     assert np.all(np.diff(errors, axis=1) < -0.5)
     assert np.all(errors > [[tip_error(place, 1e5, m, PRINTED)] for m in loads])
-
-
-def test_error_grows_with_reach():
-    errors = [tip_error((x, 0.0, 0.15), 1e5, 0.05) for x in (0.2, 0.25, 0.3, 0.35, 0.4, 0.44)]
-    assert np.all(np.diff(errors) > 1.0)
+    assert np.all(np.diff([tip_error((x, 0.0, 0.15), 1e5, 0.05) for x in (0.2, 0.3, 0.4, 0.44)]) > 1.0)
 
 
 def test_each_link_has_its_own_pressure_unless_it_is_rigid():
@@ -100,13 +88,12 @@ def test_a_turn_of_the_base_turns_everything(motion: Motion):
 
     def moved(theta_1: float) -> ArmOutputs:
         turn = np.array([theta_1, 0.0, 0.0])
-        return walk(
-            VslArm(replace(EXACT, motion=motion, q_0=start + turn)), ArmInputs(q_cmd=goal + turn, load=0.05), 10
-        )[-1]
+        arm = VslArm(replace(EXACT, motion=motion, q_0=start + turn))
+        return walk(arm, ArmInputs(q_cmd=goal + turn, load=0.05), 10)[-1]
 
     y = moved(0.0)
     assert y.p_WG[1] == 0.0
-    for theta_1 in (-2.0, 0.6, 3.0):
+    for theta_1 in (-2.0, 0.6):
         c, s = math.cos(theta_1), math.sin(theta_1)
         R: Floats = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         turned = moved(theta_1)
@@ -135,21 +122,17 @@ def test_currents_hold_the_weight():
     np.testing.assert_allclose(y.i_meas, [0.0, tau_2 / 1.78, tau_3 / 1.78], rtol=1e-6)
 
 
-def test_the_gears_have_no_friction_at_the_start():
-    arm = VslArm(replace(PRINTED, q_0=reach(*OUT)))
-    u = ArmInputs(q_cmd=reach(*OUT), load=0.1)
-    before = arm.outputs(0.0, u).i_meas
-    assert before[1] > 0.5
-    np.testing.assert_allclose(arm.step(0.0, 0.02, u).i_meas, before, atol=1e-9)
-
-
-def test_current_depends_on_the_way_by_which_the_joint_came():
+def test_current_depends_on_the_way_by_which_the_joint_came_and_not_at_the_start():
     u = ArmInputs(q_cmd=reach(0.35, 0.0, 0.1))
     above, below = (
         walk(VslArm(replace(EXACT, q_0=u.q_cmd + np.array([0.2, way, 0.0]))), u, 20)[-1].i_meas for way in (0.3, -0.3)
     )
     assert below[1] - above[1] == pytest.approx(2.0 * 0.06 / 1.78, rel=1e-4)
     assert below[0] == pytest.approx(-0.06 / 1.78)
+    arm = VslArm(replace(PRINTED, q_0=u.q_cmd))
+    before = arm.outputs(0.0, u).i_meas
+    assert before[1] > 0.5
+    np.testing.assert_allclose(arm.step(0.0, 0.02, u).i_meas, before, atol=1e-9)
 
 
 def test_the_base_motor_feels_inertia_when_it_starts_and_stops():
@@ -175,21 +158,14 @@ def test_the_base_motor_holds_back_an_arm_that_is_drawn_in_while_it_turns():
     assert i_1 == pytest.approx(torque / 1.78, rel=1e-3)
 
 
-def test_joints_follow_their_profile():
-    arm = VslArm(EXACT)
-    u = ArmInputs(q_cmd=np.array([0.5, 0.8411, -1.2]), qd_cmd=np.array([0.5, 0.0, 0.2]))
-    y = walk(arm, u, 25)[-1]
-    assert y.q_meas[0] == pytest.approx(0.25)
-    assert y.q_meas[2] == pytest.approx(-1.6821 + 0.1, abs=2e-3)
-
-
-def test_pressure_follows_its_command_and_stiffens_the_arm():
+def test_pressure_follows_its_command_and_stiffens_the_arm_and_joints_follow_their_profile():
     arm = VslArm(replace(EXACT, q_0=reach(*OUT)))
-    u = ArmInputs(q_cmd=reach(*OUT), p_cmd=np.array([2e5, 1e5]))
-    y = walk(arm, u, 200)
-    assert y[-1].p_meas[0] == pytest.approx(2e5, abs=2000.0)
-    assert y[-1].p_meas[1] == pytest.approx(1e5, abs=2000.0)
+    y = walk(arm, ArmInputs(q_cmd=reach(*OUT), p_cmd=np.array([2e5, 1e5])), 200)
+    np.testing.assert_allclose(y[-1].p_meas, [2e5, 1e5], atol=2000.0)
     assert np.all(np.diff([x.p_WG[2] for x in y[:50]]) > 0.0)
+    moved = walk(VslArm(EXACT), ArmInputs(q_cmd=np.array([0.5, 0.8, -1.2]), qd_cmd=np.array([0.5, 0.0, 0.2])), 25)[-1]
+    assert moved.q_meas[0] == pytest.approx(0.25)
+    assert moved.q_meas[2] == pytest.approx(-1.6821 + 0.1, abs=2e-3)
 
 
 def test_the_centre_line_goes_from_the_base_to_the_tip():
@@ -203,19 +179,12 @@ def test_the_centre_line_goes_from_the_base_to_the_tip():
 
 
 def test_noise_is_as_large_as_declared():
-    arm = VslArm(Params(seed=3, leak_time=1e9))
-    y = walk(arm, ArmInputs(), 1500)
+    y = walk(VslArm(Params(seed=3, leak_time=1e9)), ArmInputs(), 800)
     q, i, p = (np.std([getattr(x, name) for x in y], axis=0) for name in ("q_meas", "i_meas", "p_meas"))
-    np.testing.assert_allclose(q, math.radians(0.06), rtol=0.06)
-    np.testing.assert_allclose(i, 0.003, rtol=0.06)
-    np.testing.assert_allclose(p, 200.0, rtol=0.06)
-    np.testing.assert_allclose(np.std([x.p_WG_meas - x.p_WG for x in y], axis=0), 0.0005, rtol=0.06)
-
-
-def test_seeds_differ_and_equal_seeds_do_not():
-    a, b, c = (flat(walk(VslArm(Params(seed=s)), ArmInputs(), 5)[-1]) for s in (1, 1, 2))
-    np.testing.assert_array_equal(a, b)
-    assert np.abs(a - c).max() > 1e-5
+    np.testing.assert_allclose(q, math.radians(0.06), rtol=0.08)
+    np.testing.assert_allclose(i, 0.003, rtol=0.08)
+    np.testing.assert_allclose(p, 200.0, rtol=0.08)
+    np.testing.assert_allclose(np.std([x.p_WG_meas - x.p_WG for x in y], axis=0), 0.0005, rtol=0.08)
 
 
 def course(i: int) -> ArmInputs:
@@ -229,60 +198,35 @@ def course(i: int) -> ArmInputs:
 
 
 @pytest.mark.parametrize("motion", list(Motion))
-@pytest.mark.parametrize("steps", [0, 10, 20])
-def test_continues_bit_for_bit_from_a_state_here_and_in_another_arm(motion: Motion, steps: int):
+def test_continues_bit_for_bit_from_a_state_and_outputs_at_the_start_know_the_load(motion: Motion):
     params = Params(motion=motion, seed=5)
-    arm, other = VslArm(params), VslArm(params)
-    walk(other, ArmInputs(load=0.1), 3)
-    for i in range(steps):
-        arm.step(0.02 * i, 0.02, course(i))
-    state = arm.get_state()
-    wanted = [flat(arm.step(0.02 * i, 0.02, course(i))) for i in range(steps, 30)]
-    for again in (arm, other):
-        again.set_state(state)
-        found = [flat(again.step(0.02 * i, 0.02, course(i))) for i in range(steps, 30)]
-        np.testing.assert_array_equal(found, wanted)
-
-
-@pytest.mark.parametrize("motion", list(Motion))
-def test_outputs_at_the_start_know_the_load_and_change_nothing(motion: Motion):
-    asked, fresh = VslArm(Params(motion=motion)), VslArm(Params(motion=motion))
-    light, heavy = (asked.outputs(0.0, ArmInputs(load=m)) for m in (0.0, 0.1))
+    assert_continues(lambda: VslArm(params), course, [0, 10], 10, 0.02)
+    assert_outputs_change_nothing(lambda: VslArm(params), ArmInputs(load=0.1), 0.02)
+    light, heavy = (VslArm(params).outputs(0.0, ArmInputs(load=m)) for m in (0.0, 0.1))
     assert heavy.p_WG[2] < light.p_WG[2] - 0.005
-    np.testing.assert_array_equal(
-        [flat(y) for y in walk(asked, ArmInputs(load=0.1), 3)], [flat(y) for y in walk(fresh, ArmInputs(load=0.1), 3)]
-    )
-    np.testing.assert_array_equal(
-        flat(fresh.outputs(0.06, ArmInputs())), flat(fresh.outputs(0.06, ArmInputs(load=0.2)))
-    )
+    other = VslArm(replace(params, seed=6)).outputs(0.0, ArmInputs())
+    assert np.abs(flat(other) - flat(light)).max() > 1e-5
 
 
 def test_swinging_arm_comes_to_the_quasi_static_rest():
     u = ArmInputs(q_cmd=reach(*OUT), load=0.05, p_cmd=np.array([1e5, 1e5]))
     hinges = replace(EXACT, hinges_dynamic=6, leak_time=1e9, damping_time=0.05)
+    dynamic = replace(hinges, motion=Motion.DYNAMIC)
     still, swinging, coarse = (
-        walk(VslArm(p), u, 200)[-1]
-        for p in (
-            hinges,
-            replace(hinges, motion=Motion.DYNAMIC),
-            replace(hinges, motion=Motion.DYNAMIC, hinges_dynamic=2),
-        )
+        walk(VslArm(p), u, 100)[-1] for p in (hinges, dynamic, replace(dynamic, hinges_dynamic=2))
     )
-    np.testing.assert_allclose(swinging.p_WG, still.p_WG, atol=1e-6)
-    np.testing.assert_allclose(swinging.q_meas, still.q_meas, atol=1e-6)
+    np.testing.assert_allclose([swinging.p_WG, swinging.q_meas], [still.p_WG, still.q_meas], atol=1e-6)
     assert np.linalg.norm(coarse.p_WG - still.p_WG) < 3e-4
 
 
 @pytest.mark.parametrize(
-    ("dt", "motions"),
-    [pytest.param(0.001, [Motion.QUASI_STATIC], marks=pytest.mark.slow), (0.0137, Motion), (0.1, Motion)],
+    ("dt", "motion"), [(0.004, Motion.QUASI_STATIC), (0.0137, Motion.DYNAMIC), (0.1, Motion.DYNAMIC)]
 )
-def test_any_step_will_do(dt: float, motions: Iterable[Motion]):
+def test_any_step_will_do(dt: float, motion: Motion):
     u = ArmInputs(q_cmd=reach(*OUT), qd_cmd=np.array([0.0, 0.5, 1.0]), load=0.05)
-    seconds = 3.0 if dt > 0.01 else 1.0
-    for motion in motions:
-        y = walk(VslArm(replace(EXACT, motion=motion, leak_time=1e9)), u, round(seconds / dt), dt)[-1]
-        np.testing.assert_allclose(y.p_WG, at(OUT, load=0.05).p_WG, atol=6e-4)
+    seconds = 3.0 if motion is Motion.DYNAMIC else 1.0
+    y = walk(VslArm(replace(EXACT, motion=motion, leak_time=1e9)), u, round(seconds / dt), dt)[-1]
+    np.testing.assert_allclose(y.p_WG, at(OUT, load=0.05).p_WG, atol=6e-4)
 
 
 def test_inputs_are_not_kept():
@@ -299,53 +243,47 @@ def test_an_arm_that_buckles_is_refused_and_stays_as_it_was(motion: Motion):
     params = replace(EXACT, motion=motion, EI_0=0.05, EI_p=0.0, q_0=np.array([0.0, math.pi / 2.0, 0.0]))
     arm = VslArm(params)
     state = arm.get_state()
-    with pytest.raises(NoEquilibrium, match="buckles"):
+    with pytest.raises(NoEquilibrium):
         arm.step(0.0, 0.02, ArmInputs(q_cmd=params.q_0, load=0.5))
     assert arm.get_state() == state
 
 
 @pytest.mark.parametrize(
-    ("changes", "fault"),
+    "changes",
     [
-        ({"load": -0.01}, "load -0.01 kg must be from 0 to 0.5 kg"),
-        ({"load": math.nan}, "load nan kg"),
-        ({"load": math.inf}, "load inf kg"),
-        ({"load": 0.6}, "load 0.6 kg"),
-        ({"q_cmd": np.array([0.0, math.nan, 0.0])}, "must be finite"),
-        ({"q_cmd": np.array([0.0, -6.3, 0.0])}, "rad must be from -6.283 to 6.283 rad"),
-        ({"p_cmd": np.array([-1.0, 1e5])}, "must be from 0 to 300000 Pa"),
-        ({"p_cmd": np.array([1e5, 4e5])}, "must be from 0 to 300000 Pa"),
+        {"load": -0.01},
+        {"load": math.nan},
+        {"load": 0.6},
+        {"q_cmd": np.array([0.0, math.nan, 0.0])},
+        {"q_cmd": np.array([0.0, -6.3, 0.0])},
+        {"p_cmd": np.array([-1.0, 1e5])},
+        {"p_cmd": np.array([1e5, 4e5])},
     ],
 )
-def test_unusable_inputs_are_refused_and_change_nothing(changes: dict[str, Any], fault: str):
-    arm = VslArm(EXACT)
+def test_unusable_inputs_are_refused_and_change_nothing(changes: dict[str, Any], wording: Wording):
+    arm, u = VslArm(EXACT), replace(ArmInputs(), **changes)
     walk(arm, ArmInputs(), 2)
     state = arm.get_state()
-    u = replace(ArmInputs(), **changes)
-    with pytest.raises(InvalidInput, match=fault):
+    with pytest.raises(InvalidInput) as refused:
         arm.step(0.04, 0.02, u)
-    with pytest.raises(InvalidInput, match=fault):
+    wording.check(refused.value)
+    with pytest.raises(InvalidInput):
         VslArm(EXACT).outputs(0.0, u)
     assert arm.get_state() == state
 
 
-def test_contradicting_parameters_are_refused_all_at_once():
+@pytest.mark.parametrize(
+    ("faults", "changes"),
+    [
+        (3, {"motion": Motion.DYNAMIC, "L_2": 0.06, "cap": 0.04, "valve_tolerance": 2000.0, "link_mass": 0.0}),
+        (2, {"L_2": -1.0, "hinges": 0}),
+        (1, {"links": 4}),
+        (1, {"links": 3, "L_4": 0.05}),
+    ],
+    ids=["contradictions", "ranges", "links", "third link"],
+)
+def test_contradicting_parameters_are_refused_all_at_once(faults: int, changes: dict[str, Any], wording: Wording):
     with pytest.raises(InvalidVslArmParameters) as caught:
-        VslArm(Params(motion=Motion.DYNAMIC, L_2=0.06, cap=0.04, valve_tolerance=2000.0, link_mass=0.0))
-    assert len(caught.value.faults) == 3
-    assert "two caps of 0.04 m leave nothing flexible of L_2 0.06 m: cap must be less than 0.03 m" in str(caught.value)
-
-
-def test_values_out_of_range_are_refused_all_at_once():
-    with pytest.raises(
-        InvalidVslArmParameters, match=r"L_2: -1\.0 is out of range: from 0\.01 to 2 m; hinges: 0"
-    ) as caught:
-        VslArm(Params(L_2=-1.0, hinges=0))
-    assert len(caught.value.faults) == 2
-
-
-def test_every_start_value_lies_in_its_range():
-    described = describe(VslArm)
-    for v in itertools.chain(described.parameters, described.inputs):
-        assert v.minimum is None or np.all(np.asarray(v.start) >= v.minimum), v.name
-        assert v.maximum is None or np.all(np.asarray(v.start) <= v.maximum), v.name
+        VslArm(Params(**changes))
+    assert len(caught.value.faults) == faults
+    wording.check(caught.value)

