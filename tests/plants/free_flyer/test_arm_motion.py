@@ -4,14 +4,13 @@ from dataclasses import astuple, replace
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
-from support.plants.arm_scene import MASS, Q_WB, SKEWED, limits, mujoco_course, skewed_arm, tumbling
+from support.plants.arm_scene import limits, mujoco_course, tumbling
 from support.restored_states import assert_continues
 from support.restored_states import flat as entries
 
-from handover.cosim.blocks.plain_rotation import ZERO, vector
+from handover.cosim.blocks.plain_rotation import ZERO
 from handover.cosim.blocks.ports import Floats
-from handover.plants.free_flyer.rigid_body import RigidBody, Wrenches
+from handover.plants.free_flyer.rigid_body import Wrenches
 from handover.plants.free_flyer.robot.free_flyer import FreeFlyer, Inputs, InvalidFlyerParameters, Params
 from handover.plants.free_flyer.robot.stopping_joints import JointLimits, Motion, StoppingJoints
 
@@ -64,39 +63,15 @@ def test_error_falls_with_the_fourth_power_of_the_step():
     assert 10.0 < wide / narrow < 30.0
 
 
-def whole(q_J: tuple[float, ...]) -> tuple[float, Floats, Floats]:
-    """Return mass, inertia about the centre of mass, and that centre p_BC, of base and arm as one body."""
-    arm = skewed_arm(len(q_J))
-    robot = tumbling(limits(len(q_J)), q_J=q_J)
-    posture, mass = robot.body.posture(q_J), MASS + sum(arm.masses)
-    bodies: list[tuple[float, Floats, Floats]] = [(MASS, np.zeros(3), SKEWED)]
-    for m, p, R, moments in zip(arm.masses, posture.centres, posture.turns, arm.inertias, strict=True):
-        M: Floats = np.reshape(R, (3, 3))
-        turned: Floats = M @ np.diag(moments) @ np.transpose(M)
-        bodies.append((m, np.array(p), turned))
-    c: Floats = np.sum([m * p for m, p, _ in bodies], axis=0) / mass
-    inertia = np.sum([I + m * ((p - c) @ (p - c) * np.eye(3) - np.outer(p - c, p - c)) for m, p, I in bodies], axis=0)
-    return mass, inertia, c
-
-
-def test_with_locked_joints_it_is_the_rigid_body_that_it_makes_up():
+def test_with_locked_joints_it_moves_as_one_whose_joints_have_no_range():
+    """The one is a rigid body of base and links; the other's joints are held by constraints."""
     robot, q_J = tumbling(limits(3)), (0.3, -0.4, 0.8)
     robot.lock()
-    start, (mass, inertia, c) = robot.motion(), whole(q_J)
-    R_WB = Rotation.from_quat(Q_WB, scalar_first=True).as_matrix()
-    e = np.transpose(R_WB) @ np.subtract(start.p_WG, start.p_WB) - c
-    v = start.v_WB + np.cross(start.w_WB, R_WB @ c)
-    body = RigidBody(mass, inertia, vector(e), vector(start.p_WB + R_WB @ c), Q_WB, vector(v), start.w_WB)
-    for _ in range(60):
-        f_B, tau_B, f_G, tau_G = PUSH
-        robot.advance(0.004, PUSH, TORQUES)
-        body.advance(0.004, f_B, vector(np.array(tau_B) - np.cross(c, f_B)), f_G, tau_G)
-    end, R = robot.motion(), Rotation.from_quat(body.q, scalar_first=True).as_matrix()
-    assert end.q_J == q_J
-    assert end.v_J == IDLE
-    np.testing.assert_allclose(end.p_WG, body.p + R @ e, atol=1e-12)
-    np.testing.assert_allclose(end.q_WB, body.q, atol=1e-12)
-    np.testing.assert_allclose(end.w_WB, body.w, atol=1e-12)
+    held = tumbling(JointLimits(q_J, q_J, (0.0,) * 3, (0.0,) * 3))
+    (_, _, _, L, *_), (_, _, _, other, *_) = robot.state, held.state
+    np.testing.assert_allclose(L, other, atol=1e-12)
+    np.testing.assert_allclose(walk(robot, 60, PUSH, TORQUES), walk(held, 60, PUSH, TORQUES), atol=1e-8)
+    assert robot.motion().q_J == q_J
 
 
 def test_a_joint_stops_at_its_limit_loses_energy_there_and_stays_until_it_is_pulled_back():

@@ -3,8 +3,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from arm_scene import Q_WB, SKEWED, mujoco_course, skewed_arm
 from scipy.spatial.transform import Rotation
+from support.plants.arm_scene import Q_WB, SKEWED, mujoco_course, skewed_arm
 from support.restored_states import assert_continues, assert_outputs_change_nothing, flat
 from support.wording import Wording
 
@@ -70,20 +70,6 @@ def test_momenta_and_energy_stay_over_ten_seconds_of_tumbling():
     np.testing.assert_allclose(y.p_WB, p.p_WB_0 + 10.0 * v, rtol=1e-9)
 
 
-def test_a_force_at_the_gripper_gives_momentum_and_its_moment():
-    p, f, seconds = replace(DEFAULT, p_WB_0=np.array([0.3, 0.1, -0.2])), np.array([0.2, -0.1, 0.3]), 0.8
-    u, robot, moment = Inputs(f_G=f, tau_G=np.array([0.01, 0.0, -0.02])), FreeFlyer(p), np.zeros(3)
-    y = before = robot.outputs(0.0, u)
-    for i in range(800):
-        y = robot.step(0.001 * i, 0.001, u)
-        moment += 0.0005 * (np.cross(before.p_WG, f) + np.cross(y.p_WG, f)) + 0.001 * u.tau_G
-        before = y
-    L = spin(p.I_B, y.q_WB, y.w_WB) + p.mass * np.cross(y.p_WB, y.v_WB)
-    np.testing.assert_allclose(p.mass * y.v_WB, seconds * f, rtol=1e-12)
-    np.testing.assert_allclose(L, moment, atol=1e-6)  # about the world's origin; the trapezium rule's error
-    assert np.linalg.norm(moment) > 0.04
-
-
 def test_rates_are_newtons_and_eulers_laws():
     rng = np.random.default_rng(4)
     m, e, L, (f_B, tau_B, f_G, tau_G) = 9.584, rng.normal(size=3), rng.normal(size=3), rng.normal(size=(4, 3))
@@ -95,20 +81,6 @@ def test_rates_are_newtons_and_eulers_laws():
     np.testing.assert_allclose(dL, R @ tau_B + np.cross(R @ e, f_G) + tau_G, rtol=1e-12)
     half_w = vector(0.5 * I_inverse @ np.transpose(R) @ L)
     np.testing.assert_allclose(dq, quaternion_multiply(quaternion(q), (0.0, *half_w)), rtol=1e-12)
-
-
-def test_a_push_at_the_gripper_is_the_force_there_and_none_changes_nothing():
-    q = Rotation.from_euler("xyz", [0.3, -0.5, 0.9]).as_quat(scalar_first=True)
-    p, force = replace(DEFAULT, q_WB_0=q), np.array([0.3, -0.2, 0.5])
-    by_hand = Inputs(f_P=force, p_BP=p.p_BG)
-    for joints in (0, 1):
-        robot = replace(p, joints=joints, tolerance_J=0.0)
-        pushed, at_base = moved(robot, by_hand, 0.016), moved(robot, Inputs(f_G=force), 0.016)
-        np.testing.assert_allclose(flat(pushed), flat(at_base), rtol=0.0, atol=1e-6)  # held in B, not in W, for a step
-    speed = float(np.linalg.norm(moved(p, by_hand, 0.16).v_WB))
-    assert speed == pytest.approx(float(np.linalg.norm(force)) * 0.16 / p.mass, rel=1e-6)
-    idle = replace(wrench(), p_BP=np.ones(3))
-    np.testing.assert_array_equal(flat(moved(TUMBLING, idle, 1.6)), flat(moved(TUMBLING, wrench(), 1.6)))
 
 
 @pytest.mark.parametrize("joints", [0, 2])
@@ -123,6 +95,10 @@ def test_a_push_on_the_gripper_is_the_wrench_there_and_one_on_the_base_moves_its
     on_base = moved(p, Inputs(f_P=force, p_BP=np.array([0.0, 0.1, 0.0])), 0.16)
     assert np.all(on_base.v_J[:joints] != 0.0)  # the arm stays behind
     assert np.dot(on_base.v_WB, force) > 0.0
+    at_base = replace(p, joints=0)  # a push there is a force and its moment, held in B, not in W, for a step
+    by_base = Inputs(f_B=matrix(q).T @ force, tau_B=np.cross([0.0, 0.1, 0.0], matrix(q).T @ force))
+    pushed = moved(at_base, Inputs(f_P=force, p_BP=np.array([0.0, 0.1, 0.0])), 0.016)
+    np.testing.assert_allclose(flat(pushed), flat(moved(at_base, by_base, 0.016)), rtol=0.0, atol=1e-6)
 
 
 def test_error_falls_with_the_fourth_power_of_the_step():

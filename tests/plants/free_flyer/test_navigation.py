@@ -67,15 +67,6 @@ def each_axis(what: dict[str, float]) -> Floats:
     return np.repeat([what[name] for name in WHATS], 3)
 
 
-def test_noise_is_white_and_as_far_off_as_declared():
-    off_by = errors(replace(Params(seed=5), **{f"{what}_noise": x for what, x in UNLIKE_EACH_OTHER.items()}), 2000)
-    np.testing.assert_allclose(np.std(off_by, axis=0), each_axis(UNLIKE_EACH_OTHER), rtol=0.07)
-    correlation = np.corrcoef(np.transpose(off_by)) - np.eye(12)
-    assert np.max(np.abs(correlation)) < 0.1
-    steps_apart = np.mean(off_by[1:] * off_by[:-1], axis=0) / np.var(off_by, axis=0)
-    assert np.max(np.abs(steps_apart)) < 0.1
-
-
 def test_noise_is_that_of_numpys_generator_by_the_seed():
     rng, ys = np.random.default_rng(7), courses(Params(seed=7), 3)
     for i, y in enumerate(ys):

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support.plants.partner_runs import DOWN, P_WO, STILL, beside, lift, take, taken
+from support.processes import with_path
 
 from handover.cosim.blocks.ports import Floats
 from handover.plants.helix.gripper_fingers import finger_joints
@@ -146,9 +147,10 @@ def test_fingers_are_where_they_are_painted_and_mirror_nothing():
 
 @pytest.mark.slow
 def test_plain_python_gives_the_same_grasp():
-    script = "from partner_runs import *\ny = take(HandoverPartner(STILL), beside(0.004, 0.0, 0.0))[-1]\n"
-    path = os.pathsep.join([str(Path(__file__).parents[3]), str(Path(__file__).parent)])
-    call, env = [sys.executable, "-c", f"{script}print(*y.p_WO, *y.f_G)"], {"PYTHONPATH": path, "HANDOVER_COMPILE": "0"}
-    done = subprocess.run(call, env=os.environ | env, capture_output=True, text=True, check=True)
+    script = (
+        "from support.plants.partner_runs import *\ny = take(HandoverPartner(STILL), beside(0.004, 0.0, 0.0))[-1]\n"
+    )
+    call, env = [sys.executable, "-c", f"{script}print(*y.p_WO, *y.f_G)"], with_path() | {"HANDOVER_COMPILE": "0"}
+    done = subprocess.run(call, env=env, capture_output=True, text=True, check=True)
     y = take(HandoverPartner(STILL), beside(0.004, 0.0, 0.0))[-1]
     np.testing.assert_allclose([float(x) for x in done.stdout.split()], [*y.p_WO, *y.f_G], atol=1e-6)

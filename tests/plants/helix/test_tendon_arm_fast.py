@@ -1,10 +1,8 @@
-import math
-
 import numpy as np
 import pytest
+from support.plants.beams import elastica
 
 from handover.cosim.blocks.block import InvalidState
-from handover.cosim.blocks.ports import Floats
 from handover.fmus.sources import closure
 from handover.plants.helix.arm.tendon_arm import TendonArm
 from handover.plants.helix.arm.tendon_arm_fast import TendonArmFast
@@ -65,33 +63,6 @@ def test_moves_and_settles_as_the_arm_in_exudyn_in_other_sequences():
     found = [differences(seed, seconds=2.0, settle=1.0) for seed in range(3)]
     assert max(largest for largest, _ in found) < 0.1e-3
     assert sum(slack > 0 for _, slack in found) > 1
-
-
-def elastica(force: float, EI: float, l: float) -> tuple[float, float]:
-    """Return how far the tip of an inextensible cantilever goes along and across under a transverse force at its tip.
-
-    EI theta'' = -F cos(theta), theta(0) = theta'(l) = 0, by shooting over the curvature at the mount.
-    """
-
-    def shoot(curvature: float, n: int = 500) -> tuple[float, float, float]:
-        state, h = np.array([0.0, curvature, 0.0, 0.0]), l / n
-
-        def slope(s: Floats) -> Floats:
-            return np.array([s[1], -force / EI * math.cos(s[0]), math.cos(s[0]), math.sin(s[0])])
-
-        for _ in range(n):
-            a = slope(state)
-            b = slope(state + 0.5 * h * a)
-            c = slope(state + 0.5 * h * b)
-            d = slope(state + h * c)
-            state = state + h / 6.0 * (a + 2.0 * b + 2.0 * c + d)
-        return float(state[1]), float(state[2]), float(state[3])
-
-    low, high = 0.0, 2.0 * force * l / EI
-    for _ in range(40):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if shoot(middle)[0] < 0.0 else (low, middle)
-    return shoot(low)[1:]
 
 
 @pytest.mark.slow

@@ -1,5 +1,9 @@
+"""Shapes of objects: where rays meet them, integrals over them, and polygons that are none."""
+
 import math
+from collections.abc import Callable
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,7 +12,7 @@ from hypothesis import strategies as st
 from support.wording import Wording
 
 from handover.cosim.blocks.ports import Floats
-from handover.plants.ir_grasp.objects import drawn_solid
+from handover.plants.ir_grasp.objects import SOLIDS, Thing, drawn_solid, outlines
 from handover.plants.ir_grasp.pymunk_edge import convex_parts
 from handover.plants.ir_grasp.shapes import Disc, Point, Polygon, Rectangle, capsule_hit, polygon_faults
 
@@ -33,15 +37,37 @@ def test_a_polygon_with_the_corners_of_a_rectangle_is_that_rectangle():
                 assert other == pytest.approx(one)
 
 
-def test_integrals_of_a_polygon_with_a_dent_are_those_over_its_area():
-    p = np.random.default_rng(0).uniform(-0.045, 0.045, (200000, 2))
-    x, y = p[:, 0], p[:, 1]
-    inside = (x > -0.03) & (x < 0.03) & (y > -0.02) & (y < 0.04) & ((x < -0.01) | (y < -0.005))
-    assert HOOK.area == pytest.approx(0.09**2 * float(np.mean(inside)), rel=0.01)
-    middle = np.mean(p[inside], axis=0, dtype=np.float64)
-    np.testing.assert_allclose(HOOK.centroid, middle, atol=2e-4)
-    away: Floats = np.linalg.norm(p[inside] - middle, axis=1)
-    assert HOOK.radius_of_gyration_squared == pytest.approx(float(np.mean(away**2, dtype=np.float64)), rel=0.01)
+@pytest.mark.parametrize(
+    ("shape", "inside"),
+    [
+        (Disc(radius=0.04), lambda x, y: np.hypot(x, y) < 0.04),
+        (
+            Rectangle(low=(-0.04, -0.025), high=(0.02, 0.025)),
+            lambda x, y: (x > -0.04) & (x < 0.02) & (np.abs(y) < 0.025),
+        ),
+        (
+            HOOK,
+            lambda x, y: (x > -0.03) & (x < 0.03) & (y > -0.02) & (y < 0.04) & ((x < -0.01) | (y < -0.005)),
+        ),
+    ],
+    ids=["disc", "rectangle", "hook"],
+)
+def test_integrals_of_a_shape_are_those_over_its_area(
+    shape: Disc | Rectangle | Polygon, inside: Callable[[Floats, Floats], Floats]
+):
+    p: Floats = np.random.default_rng(0).uniform(-0.045, 0.045, (200000, 2))
+    p = p[inside(p[:, 0], p[:, 1])]
+    assert shape.area == pytest.approx(0.09**2 * len(p) / 200000, rel=0.01)
+    middle = np.mean(p, axis=0, dtype=np.float64)
+    np.testing.assert_allclose(shape.centroid, middle, atol=2e-4)
+    away: Floats = np.linalg.norm(p - middle, axis=1)
+    assert shape.radius_of_gyration_squared == pytest.approx(float(np.mean(away**2)), rel=0.01)
+    assert shape.mean_distance == pytest.approx(float(np.mean(away)), rel=0.01)
+
+
+def test_a_slender_bar_has_the_friction_arm_of_a_line():
+    bar = Rectangle(low=(0.03, -0.005), high=(0.13, 0.005))
+    assert bar.mean_distance == pytest.approx(0.025, rel=0.03)  # a quarter of the length, and a little
 
 
 def test_a_ray_into_a_dent_meets_what_is_nearer():
@@ -114,3 +140,61 @@ def test_simple_polygons_are_accepted():
     drawn = [drawn_solid(seed).parts[0] for seed in range(60)]
     for shape in (HOOK, *(s for s in drawn if isinstance(s, Polygon))):
         assert polygon_faults(shape.corners, "corners") == []
+
+
+def met_of_polygons(thing: Thing, start: tuple[float, float], heading: float) -> float | None:
+    """Distance at which a ray crosses an edge of the outlines first."""
+    d = np.array([math.cos(heading), math.sin(heading)])
+    found: list[float] = []
+    for outline in outlines(SOLIDS[thing], points=5000):
+        a, b = outline - start, np.roll(outline, -1, axis=0) - start
+        edge = b - a
+        with np.errstate(divide="ignore", invalid="ignore"):
+            det = d[0] * edge[:, 1] - d[1] * edge[:, 0]
+            along = (a[:, 0] * edge[:, 1] - a[:, 1] * edge[:, 0]) / det
+            across = (a[:, 0] * d[1] - a[:, 1] * d[0]) / det
+        found.extend(along[(along > 0.0) & (across >= 0.0) & (across <= 1.0)])
+    return min(found, default=None)
+
+
+@given(st.sampled_from(list(SOLIDS)), st.floats(0.0, 2.0 * math.pi), st.floats(0.07, 0.2), st.floats(-0.08, 0.08))
+def test_a_ray_meets_the_outline(thing: Thing, bearing: float, distance: float, aside: float):
+    start = (distance * math.cos(bearing), distance * math.sin(bearing))
+    heading = bearing + math.pi + math.atan2(aside, distance)
+    met, wanted = met_of(thing, *start, heading), met_of_polygons(thing, start, heading)
+    if met is None or wanted is None:
+        beside = [met_of(thing, *start, heading + turn) for turn in (-1e-3, 1e-3)]
+        assert (met is None and wanted is None) or None in beside  # the ray grazes a silhouette
+    else:
+        assert met[0] == pytest.approx(wanted, abs=1e-5 / max(met[1], 1e-3))
+        assert 0.0 < met[1] <= 1.0 + 1e-12
+
+
+def met_of(thing: Thing, x: float, y: float, heading: float) -> tuple[float, float] | None:
+    hit = SOLIDS[thing].intersect(x, y, math.cos(heading), math.sin(heading))
+    return None if hit is None else (hit.distance, hit.cosine)
+
+
+def around(distance: float, cosine: float) -> Any:
+    return pytest.approx(np.array([distance, cosine]))
+
+
+def test_angle_of_incidence_and_the_nearer_part_hides_the_other():
+    cylinder, box, cup, r = Thing.CYLINDER, Thing.PAPER_BOX_A, Thing.BABY_CUP_A, 0.033
+    for share in (0.0, 0.5, -0.9):
+        cosine = math.sqrt(1.0 - share**2)
+        assert met_of(cylinder, 0.1, share * r, math.pi) == around(0.1 - r * cosine, cosine)
+    assert met_of(box, 0.1, 0.0, math.pi) == around(0.1 - 0.0375, 1.0)
+    slanting = met_of(box, 0.0, 0.075, -math.pi / 2.0 + 0.3)
+    assert slanting == around(0.05 / math.cos(0.3), math.cos(0.3))
+    assert met_of(cup, 0.2, 0.0, math.pi) == around(0.2 - 0.054, 1.0)
+    assert met_of(cup, -0.2, 0.0, 0.0) == around(0.2 - 0.035, 1.0)
+    assert met_of(cup, 0.045, 0.1, -math.pi / 2.0) == around(0.1 - 0.006, 1.0)
+
+
+def test_the_outline_reaches_as_far_as_the_solid_and_a_ray_that_points_away_meets_nothing():
+    for thing, solid in SOLIDS.items():
+        assert np.max(np.linalg.norm(np.vstack(outlines(solid)), axis=1)) == pytest.approx(solid.reach)
+        assert met_of(thing, 0.1, 0.0, 0.0) is None
+    cup, other = SOLIDS[Thing.BABY_CUP_A], SOLIDS[Thing.BABY_CUP_B]
+    assert (cup.yaw - other.yaw, cup.parts) == (pytest.approx(math.pi / 2.0), other.parts)

@@ -1,11 +1,11 @@
-"""The rest of the chain against the formulas of straight beams, its own potential energy, and a refined self."""
+"""The rest of the chain against straight beams, the elastica, its own potential energy, and a refined self."""
 
 import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.plants.beams import ONE_LINK, rest, tip
+from support.plants.beams import ONE_LINK, elastica, rest, tip
 from support.wording import Wording
 
 from handover.plants.vsl.chain import Pose, VslChain
@@ -152,3 +152,13 @@ def test_buckles_at_eulers_load():
         except NoEquilibrium:
             high = middle
     assert low * 9.81 == pytest.approx(math.pi**2 * 0.55 / (4.0 * 0.225**2), rel=1e-3)
+
+
+@pytest.mark.parametrize("load", [0.1, 2.0])
+def test_many_hinges_bend_far_as_the_elastica_and_six_almost(load: float):
+    along, across = elastica(load * 9.81, ONE_LINK.EI_0, 0.225)
+    params = replace(ONE_LINK, shear_0=1e12)
+    fine, six, three = (abs(tip(params, (0.0, 0.0), 0.0, load, n) - (0.225 + along - 1j * across)) for n in (100, 6, 3))
+    assert fine < 2e-4 * across
+    assert six < 0.01 * across
+    assert 2.5 * six < three < 5.0 * six

@@ -3,6 +3,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.wording import Wording
 
 from handover.controllers.ir_grasp.parameters import Correction, Strategy
 from handover.plants.ir_grasp.hand import PALM
@@ -35,9 +36,9 @@ def test_the_hand_comes_before_the_middle_of_what_is_seen():
     assert Situation.draw(p, 0).p_WH_pregrasp[1] == pytest.approx(middle)
 
 
-def test_perturbations_are_within_their_bounds_and_never_towards_the_hand():
+def test_perturbations_are_within_their_bounds_never_towards_the_hand_and_vision_is_off_by_its_deviations():
     p = Parameters()
-    drawn = [Situation.draw(p, seed) for seed in range(300)]
+    drawn = [Situation.draw(p, seed) for seed in range(500)]
     shifts = np.array([s.p_WO for s in drawn])
     lengths = np.linalg.norm(shifts, axis=1)
     assert p.shift_least <= lengths.min() < p.shift_least + 0.001
@@ -45,13 +46,8 @@ def test_perturbations_are_within_their_bounds_and_never_towards_the_hand():
     assert shifts[:, 0].min() >= -1e-12
     assert abs(np.mean(shifts[:, 1])) < 0.005
     assert max(abs(s.turn) for s in drawn) == pytest.approx(p.turn_most, rel=0.02)
-
-
-def test_vision_is_off_by_its_deviations():
-    p = Parameters()
-    drawn = [Situation.draw(p, seed) for seed in range(1000)]
     off = np.array([[*s.p_WH_pregrasp, s.yaw] for s in drawn])
-    assert np.std(off, axis=0) == pytest.approx([p.vision_position, p.vision_position, p.vision_yaw], rel=0.1)
+    assert np.std(off, axis=0) == pytest.approx([p.vision_position, p.vision_position, p.vision_yaw], rel=0.12)
 
 
 def test_vision_places_the_hand_by_what_it_believes():
@@ -83,31 +79,27 @@ def test_a_shift_or_a_turn_replaces_what_is_drawn(perturbed: bool):
     assert (same.p_WH_start == s.p_WH_start).all()  # what vision is off by is the same
 
 
-def test_contradictions_are_told_together():
-    corners = np.zeros((8, 2))
-    corners[:4] = 1e-3 * np.array([[0, 0], [40, 40], [40, 0], [0, 40]])
-    p = Parameters(thing=Thing.POLYGON, corners=corners, corner_count=4, shift_least=0.06, shift_most=0.05)
-    shift, crossing = p.faults()
-    assert shift == "shift_least 0.06 m must be at most shift_most 0.05 m"
-    assert crossing.startswith("corners: edge 0 from (0, 0) mm to (40, 40) mm and edge 2")
-
-
-def test_equations_as_printed_are_refused_of_a_correction_that_does_not_use_them():
-    (fault,) = Parameters(literal=True, correction=Correction.FAST).faults()
-    assert fault == "literal: takes the paper's equations as printed, which correction=paper alone uses"
-    assert Parameters(literal=True, correction=Correction.PAPER).faults() == []
+CROSSING: dict[str, Any] = {"thing": Thing.POLYGON, "corners": np.zeros((8, 2)), "corner_count": 4}
+CROSSING["corners"][:4] = 1e-3 * np.array([[0, 0], [40, 40], [40, 0], [0, 40]])
 
 
 @pytest.mark.parametrize(
-    ("given", "needed"),
+    ("faults", "given"),
     [
-        ({"disc_radius": 0.05}, "thing=disc"),
-        ({"thing_seed": 3}, "thing=drawn"),
-        ({"expected": Expected.BAR, "expected_radius": 0.02}, "expected=disc"),
-        ({"nudge_time": 1.0}, "a nudge"),
-        ({"other_place": np.array([0.0, -0.1])}, "an other_radius above 0"),
+        (2, {**CROSSING, "shift_least": 0.06, "shift_most": 0.05}),
+        (1, {"literal": True, "correction": Correction.FAST}),
+        (0, {"literal": True, "correction": Correction.PAPER}),
+        (1, {"disc_radius": 0.05}),
+        (1, {"thing_seed": 3}),
+        (1, {"expected": Expected.BAR, "expected_radius": 0.02}),
+        (1, {"nudge_time": 1.0}),
+        (1, {"other_place": np.array([0.0, -0.1])}),
     ],
 )
-def test_a_parameter_without_any_effect_is_refused(given: dict[str, Any], needed: str):
-    (fault,) = Parameters(**given).faults()
-    assert fault.endswith(f": it is that of {needed} alone")
+def test_contradictions_and_parameters_without_any_effect_are_refused(
+    faults: int, given: dict[str, Any], wording: Wording
+):
+    found = Parameters(**given).faults()
+    assert len(found) == faults
+    for fault in found:
+        wording.check(fault)

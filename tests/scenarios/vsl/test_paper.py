@@ -8,15 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 import tomli
+from support.scenarios.parameter_origins import assert_every_default_has_its_origin
 
 import handover.scenarios.vsl
 from handover.controllers.vsl.hybrid_kinematics import Params as KinematicsParams
 from handover.controllers.vsl.paths import Path, QuarterArc, segments_of
 from handover.controllers.vsl.trajectory_planner import Elbow
 from handover.controllers.vsl.trajectory_planner import Params as PlannerParams
-from handover.cosim.blocks.declarations import declared_variables
 from handover.cosim.blocks.ports import Floats
-from handover.cosim.blocks.variable import Causality
 from handover.plants.vsl.parameters import Params as ArmParams
 from handover.plants.vsl.vacuum_gripper import Params as GripperParams
 from handover.scenarios.cli.robots.vsl_train import vsl_train
@@ -39,46 +38,34 @@ def paper() -> Paper:
     return tomli.loads(file.read_text(encoding="utf-8"))
 
 
-def as_paper(value: Any) -> Any:
-    return getattr(value, "name", value).lower() if hasattr(value, "name") else value
-
-
 @pytest.mark.parametrize(
-    ("group", "params"),
+    ("group", "params", "apart"),
     [
-        ("scenario", Parameters),
-        ("hybrid", HybridParameters),
-        ("planner", PlannerParams),
-        ("kinematics", KinematicsParams),
-        ("arm", ArmParams),
-        ("gripper", GripperParams),
+        ("scenario", Parameters, NUMERICAL),
+        ("hybrid", HybridParameters, {field.name for field in dataclasses.fields(Parameters)} | CHOSEN_BY_THE_SCENARIO),
+        ("planner", PlannerParams, CHOSEN_BY_THE_SCENARIO),
+        ("kinematics", KinematicsParams, CHOSEN_BY_THE_SCENARIO),
+        ("arm", ArmParams, NUMERICAL | CHOSEN_BY_THE_SCENARIO),
+        ("gripper", GripperParams, CHOSEN_BY_THE_SCENARIO),
     ],
+    ids=["scenario", "hybrid", "planner", "kinematics", "arm", "gripper"],
 )
-def test_every_default_has_an_origin_with_its_value_and_unit(paper: Paper, group: str, params: type[Any]):
-    declared = {v.name: v.unit.symbol for v in declared_variables(params, Causality.PARAMETER)}
-    for name, entry in paper[group].items():
-        assert np.array_equal(as_paper(getattr(params(), name)), entry["value"]), name
-        assert entry["unit"] == declared[name], name
-    apart = NUMERICAL | {"seed"}
-    if group != "scenario":
-        apart |= CHOSEN_BY_THE_SCENARIO
-    if group != "hybrid":
-        assert {f.name for f in dataclasses.fields(params)} - apart == set(paper[group]) - apart
+def test_every_default_has_an_origin_with_its_value_and_unit(
+    paper: Paper, group: str, params: type[Any], apart: set[str]
+):
+    assert_every_default_has_its_origin(paper[group], params, {"seed", *apart})
 
 
-def test_the_planner_and_the_kinematics_know_the_arms_dimensions(paper: Paper):
+def test_values_that_several_groups_have_are_the_same(paper: Paper):
+    value = {group: {name: entry["value"] for name, entry in entries.items()} for group, entries in paper.items()}
     for name in ("L_1", "L_2", "L_3"):
-        assert paper["arm"][name]["value"] == paper["planner"][name]["value"] == paper["kinematics"][name]["value"]
-
-
-def test_the_scenario_leaves_the_planners_speed_and_points_as_they_are(paper: Paper):
-    assert paper["scenario"]["speed"]["value"] == paper["planner"]["V"]["value"]
-    assert paper["scenario"]["points"]["value"] == paper["planner"]["N"]["value"]
-
-
-def test_the_arm_starts_where_the_scenario_has_it_start(paper: Paper):
-    np.testing.assert_array_equal(Parameters().q_0, paper["arm"]["q_0"]["value"])
-    np.testing.assert_array_equal(Parameters(elbow=Elbow.DOWN).q_0, -np.array(paper["arm"]["q_0"]["value"]))
+        assert value["arm"][name] == value["planner"][name] == value["kinematics"][name]
+    assert (value["scenario"]["speed"], value["scenario"]["points"]) == (value["planner"]["V"], value["planner"]["N"])
+    np.testing.assert_array_equal(Parameters().q_0, value["arm"]["q_0"])
+    np.testing.assert_array_equal(Parameters(elbow=Elbow.DOWN).q_0, -np.array(value["arm"]["q_0"]))
+    assert [value["scenario"]["load"], value["scenario"]["pressure"]] in value["published"]["experiment_2"]
+    lengths = [Parameters(path=path).length for path in (Path.LINEAR, Path.CURVE, Path.SQUARE, Path.CUSTOM)]
+    assert lengths == pytest.approx([0.3, 0.1 * math.pi, 0.4, math.hypot(0.1, 0.1)])
 
 
 def test_the_electronics_are_those_of_the_paper_file(paper: Paper):
@@ -110,13 +97,3 @@ def test_the_paths_are_the_published_ones(paper: Paper):
         np.testing.assert_allclose(arc.x_c, centre)
     corners = published["square"]
     np.testing.assert_allclose(ends(Path.SQUARE), np.stack([corners, np.roll(corners, -1, axis=0)], axis=1))
-
-
-def test_the_length_of_a_path_is_that_of_its_segments():
-    lengths = [Parameters(path=path).length for path in (Path.LINEAR, Path.CURVE, Path.SQUARE, Path.CUSTOM)]
-    assert lengths == pytest.approx([0.3, 0.1 * math.pi, 0.4, math.hypot(0.1, 0.1)])
-
-
-def test_the_default_case_is_one_of_the_published_ones(paper: Paper):
-    case = [paper["scenario"]["load"]["value"], paper["scenario"]["pressure"]["value"]]
-    assert case in paper["published"]["experiment_2"]["value"]

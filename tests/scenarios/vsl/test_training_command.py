@@ -33,19 +33,16 @@ from handover.scenarios.vsl.training import Progress, VslTraining
 from handover.scenarios.vsl.training_data import Measured
 
 
-def test_the_same_seed_gives_the_same_model_in_both_forms(trained: Trained, tmp_path: Path):
-    result = call("--points", "400", "--seed", "1", "--out", tmp_path / "m.py")
+def test_a_model_has_the_same_text_in_both_forms_and_says_what_it_was_made_of(trained: Trained, tmp_path: Path):
+    result = call("--data", trained.data, "--out", tmp_path / "m.py")
     assert result.exit_code == 0, result.output
-    assert "400 points measured" in result.output
+    assert "400 points" in trained.output
     assert [p.name for p in tmp_path.iterdir()] == ["m.py"]
     module = types.ModuleType("m")
     exec((tmp_path / "m.py").read_text(), vars(module))
     assert vars(module)["DEFAULT_MODEL"] == trained.model.read_text()
-    assert "--points 400 --seed 1" in (module.__doc__ or "")
     text = read_model(trained.model).provenance
-    assert text["arm"]["fmu"] == "VslArm"
-    assert text["arm"]["parameters"]["motion"] == "QUASI_STATIC"
-    assert text["seed"] == 1
+    assert (text["arm"]["fmu"], text["arm"]["parameters"]["motion"], text["seed"]) == ("VslArm", "QUASI_STATIC", 1)
     assert 300 < sum(text["points"][k] for k in ("training", "validation", "test")) <= 400
     assert text["mean_test_errors_m"]["forward_hybrid"] < 0.1 * text["mean_test_errors_m"]["forward_model_based"]
 
@@ -68,32 +65,23 @@ def test_the_command_that_a_refusal_advises_makes_the_model_that_is_lacking(
     assert arm["mean_test_errors_m"]["forward_hybrid"] < 0.1 * arm["mean_test_errors_m"]["forward_model_based"]
 
 
-def test_links_that_do_not_reach_over_the_workspace_are_refused(tmp_path: Path):
-    result = call("--arm", "L_2=0.12", "--arm", "L_3=0.12", "--out", tmp_path / "m.json")
-    assert result.exit_code == 2
-    assert "links of 0.12 and 0.12 m" in result.output
-    assert list(tmp_path.iterdir()) == []
-
-
 @pytest.mark.slow
-def test_errors_fall_along_the_learning_curve():
+def test_errors_fall_along_the_learning_curve_which_is_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     training, measured = replace(TRAINING, forward_input=ForwardInput.X), made_up(800)
     seen: list[float] = []
-    curve = learning_curve(training, measured, lambda done, _of: seen.append(done), sizes=(400, 600, 9999))
-    assert [p.points for p in curve] == [400, 600, 800]
+    curve = learning_curve(training, measured, lambda done, _of: seen.append(done), sizes=(400, 9999))
+    assert [p.points for p in curve] == [400, 800]
     assert curve[-1].errors == training.learn(measured, nobody)[1]
     assert curve[-1].errors.forward_hybrid < curve[0].errors.forward_hybrid
     assert len({p.errors.forward_model_based for p in curve}) == 1  # the same test points
-    assert len(list(curve_table(curve))) == 4
-    assert seen == [1, 2, 3]
-
-
-@pytest.mark.slow
-def test_the_curve_is_drawn(trained: Trained, tmp_path: Path):
-    result = call("--data", trained.data, "--curve", tmp_path / "a.b.png", "--out", tmp_path / "m.json")
+    assert len(list(curve_table(curve))) == 3
+    assert seen == [1, 2]
+    monkeypatch.setattr(vsl_train_command, "learning_curve", lambda *_args: curve)
+    monkeypatch.setattr(VslTraining, "measure", measured_at_once)
+    result = call("--points", "400", "--curve", tmp_path / "a.b.png", "--out", tmp_path / "m.json")
     assert result.exit_code == 0, result.output
     assert {p.name for p in tmp_path.iterdir()} == {"a.b.png", "a.b.svg", "m.json"}
-    assert re.search(r"^ +250 +\d+\.\d\d", result.output, re.MULTILINE)
+    assert re.search(r"^ +400 +\d+\.\d\d", result.output, re.MULTILINE)
 
 
 def measured_at_once(_training: VslTraining, _progress: Progress) -> Measured:
@@ -120,12 +108,8 @@ def test_a_model_is_adapted_to_stiffer_links_by_few_points(tmp_path: Path):
     stiffer = ("--arm", "EI_0=0.605", "--arm", "EI_p=1.155e-5")
     result = call("--adapt", tmp_path / "m.json", "--points", "50", *stiffer, "--out", tmp_path / "a.json")
     assert result.exit_code == 0, result.output
-    rows = [
-        [float(x) for x in line.split()[-3:]]
-        for line in result.output.splitlines()
-        if re.match("forward|inverse", line)
-    ]
-    assert all(adapted < 0.7 * before for _, before, adapted in rows)
+    rows = [line.split()[-2:] for line in result.output.splitlines() if re.match("forward|inverse", line)]
+    assert all(float(adapted) < 0.7 * float(before) for before, adapted in rows)
     model = read_model(tmp_path / "a.json")
     assert model.provenance["adapted_from"] == shipped().provenance
     assert model.provenance["arm"]["parameters"]["EI_0"] == 0.605
@@ -137,27 +121,28 @@ def test_a_model_is_adapted_to_stiffer_links_by_few_points(tmp_path: Path):
     )
 
 
-def test_without_pytorch_the_published_network_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_without_pytorch_the_published_network_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wording: Wording
+):
     monkeypatch.setitem(sys.modules, "torch", None)
     result = call("--learned", "published", "--out", tmp_path / "m.json")
     assert result.exit_code == 2
-    assert 'pip install "handover-cosim[train]"' in result.output
+    wording.check(result.output)
     assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(
     "arguments",
     [
-        ["--points", "10"],
         ["--points", "50"],
         ["--arm", "EI_factor=1.2,1.2"],
-        ["--arm", "EI_factor=1.2,x,1"],
         ["--arm", "EI_0"],
         ["--arm", "EI=1"],
         ["--arm", "links=3"],
         ["--arm", "load_steps=8:0.1"],
         ["--arm", "EI_0=x"],
         ["--arm", "EI_0=-1"],
+        ["--arm", "L_2=0.12", "--arm", "L_3=0.12"],
         ["--save-data", "d.csv"],
         ["--curve", "c.pdf"],
         ["--epochs", "3"],
@@ -166,11 +151,9 @@ def test_without_pytorch_the_published_network_is_refused(tmp_path: Path, monkey
         ["--adapt", "m.json", "--learned", "small"],
         ["--adapt", "none.json"],
         ["--data", "none.parquet"],
-        ["--seed", "-1"],
         ["--out", "text.fmu/m.json"],
         ["--out", "m.txt"],
         pytest.param(["--out", "m" * 250 + ".json"], id="--out of a long name"),
-        ["--elbow", "left"],
         ["--out", "folder.json"],
         ["--plant", "none.fmu"],
         ["--plant", "text.fmu"],
@@ -191,23 +174,15 @@ def test_usage_errors_take_a_line(
     assert sorted(tmp_path.iterdir()) == before
 
 
-def test_an_arm_that_fails_leaves_no_file(tmp_path: Path):
-    fmu = build_block("support.scenarios.vsl_training_arms:BreakingArm", 3, tmp_path, step=Fraction(1, 50))
-    result = call("--plant", fmu, "--out", tmp_path / "m.json")
-    assert result.exit_code == 3
-    assert "the arm broke" in result.output
-    assert not (tmp_path / "m.json").exists()
-
-
-@pytest.mark.parametrize("arm", ["DistantArm", "ArmWithoutGauges"])
-def test_an_arm_that_teaches_nothing_is_refused(
-    arm: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wording: Wording
+@pytest.mark.parametrize(("arm", "status"), [("BreakingArm", 3), ("DistantArm", 2), ("ArmWithoutGauges", 2)])
+def test_an_arm_that_fails_or_teaches_nothing_leaves_no_file(
+    arm: str, status: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wording: Wording
 ):
     monkeypatch.setattr(vsl_train_command, "MIN_POINTS", 20)
     fmu = build_block(f"support.scenarios.vsl_training_arms:{arm}", 3, tmp_path, step=Fraction(1, 50))
     result = call("--points", "20", "--plant", fmu, "--out", tmp_path / "m.json")
-    assert result.exit_code == 2
-    wording.check(result.output)
+    assert result.exit_code == status
+    wording.check(re.sub(r"in [\d.]+ s", "in T s", result.output))
     assert not (tmp_path / "m.json").exists()
 
 

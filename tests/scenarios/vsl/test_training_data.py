@@ -31,12 +31,10 @@ def test_training_from_saved_points_gives_the_same_bytes(trained: Trained, tmp_p
 def test_what_was_learned_is_told(learned: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(vsl_train_command, "content_key", key_of_made_up)
     write_data(tmp_path / "d.parquet", made_up(240))
-    for name in ("a", "b"):
-        done = call("--data", tmp_path / "d.parquet", *learned, "--out", tmp_path / f"{name}.json")
-        assert done.exit_code == 0, done.output
-        assert ("currents by friction" in done.output) == (learned == ["--friction-compensation"])
-        assert ("from X = f(q) in place of q" in done.output) == (learned != ["--learned", "physics"])
-    assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()
+    done = call("--data", tmp_path / "d.parquet", *learned, "--out", tmp_path / "a.json")
+    assert done.exit_code == 0, done.output
+    assert ("currents by friction" in done.output) == (learned == ["--friction-compensation"])
+    assert ("from X = f(q) in place of q" in done.output) == (learned != ["--learned", "physics"])
 
 
 def test_points_of_a_file_are_those_written(tmp_path: Path):
@@ -49,36 +47,18 @@ def test_points_of_a_file_are_those_written(tmp_path: Path):
         np.testing.assert_array_equal(getattr(back.points, name), values)
 
 
-def scaled(name: str, factor: float) -> Callable[[Any], Any]:
-    def change(table: Any) -> Any:
-        for k in range(1, 4):
-            if f"{name}[{k}]" in table.column_names:
-                table = with_column(f"{name}[{k}]", factor * np.asarray(table[f"{name}[{k}]"]))(table)
-        return table
-
-    return change
-
-
-def shuffled(name: str) -> Callable[[Any], Any]:
-    def change(table: Any) -> Any:
-        rows = np.random.default_rng(0).permutation(100)
-        for k in range(1, 4):
-            table = with_column(f"{name}[{k}]", np.asarray(table[f"{name}[{k}]"])[rows])(table)
-        return table
-
-    return change
-
-
-def without(name: str) -> Callable[[Any], Any]:
-    return lambda table: table.drop_columns([name])
-
-
 def with_column(name: str, values: Any) -> Callable[[Any], Any]:
     return lambda table: table.set_column(table.column_names.index(name), name, [values])
 
 
-def with_metadata(metadata: Any) -> Callable[[Any], Any]:
-    return lambda table: table.replace_schema_metadata(metadata)
+def changed(name: str, change: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    def with_all(table: Any) -> Any:
+        for k in range(1, 4):
+            if f"{name}[{k}]" in table.column_names:
+                table = with_column(f"{name}[{k}]", change(np.asarray(table[f"{name}[{k}]"])))(table)
+        return table
+
+    return with_all
 
 
 def about(**origin: Any) -> Callable[[Any], Any]:
@@ -92,29 +72,25 @@ def about(**origin: Any) -> Callable[[Any], Any]:
 @pytest.mark.parametrize(
     "change",
     [
-        pytest.param(without("p_WG_meas[2]"), id="no place"),
-        pytest.param(without("order"), id="no order"),
+        pytest.param(lambda table: table.drop_columns(["p_WG_meas[2]"]), id="no place"),
         pytest.param(with_column("i_meas[3]", [0.0] * 7 + [float("nan")] * 93), id="no numbers"),
-        pytest.param(with_column("i_meas[3]", [None] + [1.0] * 99), id="no value"),
         pytest.param(with_column("q_cmd[1]", ["x"] * 100), id="text"),
         pytest.param(with_column("order", [0] * 100), id="one place in the order"),
         pytest.param(about(arm={"key": "other"}), id="another arm's key"),
         pytest.param(about(links={"L_1": 0.15, "L_2": 0.2, "L_3": 0.2, "elbow": "UP"}), id="other links"),
-        pytest.param(scaled("p_meas", 1e-5), id="bar"),
-        pytest.param(scaled("i_meas", 1e3), id="milliamperes"),
-        pytest.param(scaled("q_meas", 180.0 / np.pi), id="degrees"),
-        pytest.param(scaled("q_cmd", 180.0 / np.pi), id="commands in degrees"),
+        pytest.param(changed("p_meas", lambda p: 1e-5 * p), id="bar"),
+        pytest.param(changed("i_meas", lambda i: 1e3 * i), id="milliamperes"),
+        pytest.param(changed("q_meas", np.degrees), id="degrees"),
         pytest.param(with_column("p_meas[1]", [3.2e5] * 100), id="too much pressure"),
-        pytest.param(shuffled("p_WG_meas"), id="tips of other points"),
-        pytest.param(scaled("p_WG_meas", 1e3), id="millimetres"),
+        pytest.param(changed("p_WG_meas", lambda x: x[::-1]), id="tips of other points"),
+        pytest.param(changed("p_WG_meas", lambda x: 1e3 * x), id="millimetres"),
         pytest.param(about(version=9), id="version"),
         pytest.param(about(seed="x"), id="seed"),
         pytest.param(about(arm={"key": "k", "parameters": PARAMETERS | {"EI_0": 1.0}}), id="another parameter"),
         pytest.param(about(arm={"key": "k", "parameters": {}}), id="no parameters"),
-        pytest.param(about(arm={"key": "k"}), id="parameters lacking"),
         pytest.param(about(arm=None), id="no arm"),
-        pytest.param(with_metadata(None), id="no metadata"),
-        pytest.param(with_metadata({b"handover-vsl-data": b"{"}), id="no JSON"),
+        pytest.param(lambda table: table.replace_schema_metadata(None), id="no metadata"),
+        pytest.param(lambda table: table.replace_schema_metadata({b"handover-vsl-data": b"{"}), id="no JSON"),
     ],
 )
 def test_data_that_cannot_be_trained_on_is_refused(change: Callable[[Any], Any], tmp_path: Path, wording: Wording):
@@ -128,7 +104,7 @@ def test_data_that_cannot_be_trained_on_is_refused(change: Callable[[Any], Any],
 
 
 @pytest.mark.parametrize(
-    "arm", [{"EI_factor": np.full(3, 0.15)}, {"kt": 0.05}, {"kt": 20.0}], ids=["soft", "low kt", "high kt"]
+    "arm", [{"EI_factor": np.full(3, 0.15), "kt": 0.05}, {"kt": 20.0}], ids=["soft and low kt", "high kt"]
 )
 def test_points_of_the_oddest_arms_are_taken_back(arm: dict[str, Any], tmp_path: Path):
     training = VslTraining(fmu=cached("VslArm", 3), kinematics=ARM, points=30, seed=0, arm=arm)
