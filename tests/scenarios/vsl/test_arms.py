@@ -18,7 +18,7 @@ SCATTERED = Parameters(arm_scatter=0.1, length_scatter=0.001, arm_seed=3)
 
 
 def outcome_of(*given: str) -> Outcome:
-    p, e = parse_parameters(VslHybrid, ["settle=1", "speed=0.2", "points=20", *given]), VslHybrid()
+    p, e = parse_parameters(VslHybrid, ["settle=2", "speed=0.1", "points=20", *given]), VslHybrid()
     evaluator = e.evaluator(p)
     with Master(e.build(p, 0, lambda name: cached(VslHybrid.units[name], 3))) as master:
         master.run(e.stop_time(p), [evaluator], until=lambda: evaluator.over)

@@ -117,6 +117,7 @@ def test_the_hybrid_reports_its_forward_model_and_of_extrapolation():
     assert metrics["model_error"].value == pytest.approx(0.0015)  # 2.5 mm below the point, taken to be 1 mm below it
     assert metrics["servo_error"].value == pytest.approx(0.001)
     assert metrics["outside"].value == 0.5
+    assert "extrapolate at 50 % of the points" in evaluator.outcome().reason
 
 
 @pytest.mark.parametrize(("load", "load_steps", "share"), [(0.075, "", 0.0), (0.2, "", 1.0), (0.075, "0:0.2", 1.0)])

@@ -90,13 +90,13 @@ def test_other_paths_loads_and_pressures_succeed(experiment: type[PathExperiment
 
 @pytest.mark.parametrize(
     ("experiment", "parameters"),
-    [(VslModelBased, ("path=custom", "x_g=0.6,0,0.05")), (VslHybrid, ("model=nowhere.json",))],
+    [(VslModelBased, ("path=custom", "x_g=0.6,0,0.05")), (VslHybrid, ("model=TMP/nowhere.json",))],
 )
 def test_what_a_unit_refuses_is_named_before_anything_is_written(
     experiment: type[PathExperiment], parameters: tuple[str, ...], tmp_path: Path, wording: Wording
 ):
     with pytest.raises(InitializationError) as refused:
-        run(experiment, tmp_path / "r", *parameters)
+        run(experiment, tmp_path / "r", *(given.replace("TMP", str(tmp_path)) for given in parameters))
     wording.check(refused.value)
     assert not (tmp_path / "r").exists()
 

@@ -182,7 +182,7 @@ def test_an_arm_that_fails_or_teaches_nothing_leaves_no_file(
     fmu = build_block(f"support.scenarios.vsl_training_arms:{arm}", 3, tmp_path, step=Fraction(1, 50))
     result = call("--points", "20", "--plant", fmu, "--out", tmp_path / "m.json")
     assert result.exit_code == status
-    wording.check(re.sub(r"in [\d.]+ s", "in T s", result.output))
+    wording.check(re.sub(r", line \d+", "", result.output))
     assert not (tmp_path / "m.json").exists()
 
 

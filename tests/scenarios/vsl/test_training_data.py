@@ -18,6 +18,7 @@ from handover.scenarios.vsl.model_file import content_key
 from handover.scenarios.vsl.training import VslTraining
 
 PARAMETERS = made_up(1).origin["arm"]["parameters"]
+SHUFFLED = np.random.default_rng(0).permutation(100)
 
 
 def test_training_from_saved_points_gives_the_same_bytes(trained: Trained, tmp_path: Path):
@@ -82,7 +83,7 @@ def about(**origin: Any) -> Callable[[Any], Any]:
         pytest.param(changed("i_meas", lambda i: 1e3 * i), id="milliamperes"),
         pytest.param(changed("q_meas", np.degrees), id="degrees"),
         pytest.param(with_column("p_meas[1]", [3.2e5] * 100), id="too much pressure"),
-        pytest.param(changed("p_WG_meas", lambda x: x[::-1]), id="tips of other points"),
+        pytest.param(changed("p_WG_meas", lambda x: x[SHUFFLED]), id="tips of other points"),
         pytest.param(changed("p_WG_meas", lambda x: 1e3 * x), id="millimetres"),
         pytest.param(about(version=9), id="version"),
         pytest.param(about(seed="x"), id="seed"),
