@@ -108,7 +108,8 @@ def test_a_hand_that_got_nothing_is_felt_and_tries_again_with_other_errors():
 
 def test_who_lets_go_before_the_fingers_have_closed_lets_the_object_float():
     early: list[bool] = []
-    for changes in (*({"timing_error": 0.5, "seed": seed} for seed in range(6)), {"haste": 1.0}, {"haste": 0.0}):
+    spread: list[dict[str, Any]] = [{"timing_error": 0.5, "seed": seed} for seed in range(6)]
+    for changes in (*spread, {"haste": 1.0}, {"haste": 0.0}):
         scene = giving(replace(GIVING, reaction_time=0.1, **(STRONG | changes)))
         scene.go(0.5)
         scene.until(Activity.LET_GO, closure=1.0)
@@ -148,7 +149,7 @@ def test_a_push_that_meets_nothing_is_tried_again_and_the_object_kept():
 
 
 def test_a_person_with_errors_continues_from_a_restored_state_bit_for_bit():
-    errors = dict.fromkeys(("interface_delay", "timing_error", "effort_spread"), 0.1)
-    moving = {"depth_error": 0.2, "sight_error": 0.02, "tremor_rms": 0.001, "drift_rms": 0.002}
+    errors: dict[str, Any] = dict.fromkeys(("interface_delay", "timing_error", "effort_spread"), 0.1)
+    moving: dict[str, Any] = {"depth_error": 0.2, "sight_error": 0.02, "tremor_rms": 0.001, "drift_rms": 0.002}
     clumsy, at = replace(CALM, arm_reach=3.0, seed=4, **moving, **errors), [round(t / DT) for t in (2.5, 3.6, 4.4, 5.2)]
     assert_continues(lambda: HandAndObject(clumsy), lambda i: Inputs(closure=1.0, light=i * DT > 2.0), at, 50)

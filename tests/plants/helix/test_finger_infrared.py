@@ -124,7 +124,8 @@ def test_a_restored_state_continues_bit_for_bit():
 
 
 def test_what_cannot_be_is_refused_with_the_reason(wording: Wording):
-    for changes in ({"b": 0.001}, {"a": 0.001}, {"beam": 2.0, "tolerance": -0.1}):
+    false: list[dict[str, Any]] = [{"b": 0.001}, {"a": 0.001}, {"beam": 2.0, "tolerance": -0.1}]
+    for changes in false:
         with pytest.raises(InvalidInfraredParameters) as caught:
             FingerInfrared(Params(**changes))
         wording.check(caught.value)

@@ -27,7 +27,7 @@ from handover.plants.helix.hand.partner_parameters import Holder, Inputs, Invali
 
 def test_starts_at_its_place_in_the_hand_and_seeds_differ():
     y = HandoverPartner(Params(p_WO_0=np.array([0.1, 0.1, -0.6]))).outputs(0.0, Inputs())
-    np.testing.assert_allclose([y.p_WO, y.p_WH, y.f_G], [[0.1, 0.1, -0.6], [0.1, 0.1, -0.64], np.zeros(3)])
+    np.testing.assert_allclose([y.p_WO, y.p_WH, y.f_G], [[0.1, 0.1, -0.6], [0.1, 0.1, -0.64], [0.0] * 3])
     assert y.holder is Holder.HAND
     a, b, c = (flat(walk(HandoverPartner(Params(seed=seed)), Inputs(), 20)[-1]) for seed in (1, 1, 2))
     np.testing.assert_array_equal(a, b)

@@ -170,7 +170,7 @@ def test_joints_are_off_their_design_by_a_tolerance_drawn_once():
 
 
 def test_a_state_with_all_that_moves_and_disturbs_is_complete():
-    noises: dict[str, float] = {"noise": 5.0, "ambient_noise": 3.0, "wrist_noise": 1e-3, "heading_noise": 0.01}
+    noises: dict[str, Any] = {"noise": 5.0, "ambient_noise": 3.0, "wrist_noise": 1e-3, "heading_noise": 0.01}
     noises |= {"closure_noise": 0.01, "joint_noise": 0.01, "tension_noise": 0.1, "stiffness_tolerance": 0.02}
     p = replace(QUIET, thing=Thing.BAR, bar_size=np.array([0.03, 0.11]), ambient=40.0, active=2, **noises)
     p = replace(p, p_WH_0=np.array([-0.27, 0.0]), other_radius=0.02, p_WX_0=np.array([0.0, 0.085]))

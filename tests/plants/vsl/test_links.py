@@ -56,7 +56,7 @@ def test_stiff_links_obey_the_kinematics(links: int):
     r = 0.225 * math.cos(0.7) + forearm * math.cos(-0.4)
     z = 0.15 + 0.225 * math.sin(0.7) + forearm * math.sin(-0.4)
     np.testing.assert_allclose(y.p_WG, [r * math.cos(0.4), r * math.sin(0.4), z], atol=1e-7)
-    np.testing.assert_allclose(y.shape[[0, 1, -1]], [np.zeros(3), [0.0, 0.0, 0.15], y.p_WG], atol=1e-15)
+    np.testing.assert_allclose(y.shape[[0, 1, -1]], np.vstack([np.zeros(3), [0.0, 0.0, 0.15], y.p_WG]), atol=1e-15)
     spaces = np.linalg.norm(np.diff(y.shape[1:], axis=0), axis=1)
     wanted = np.full(23, 0.225 / 23) if links == 1 else np.repeat([0.225 / 12, forearm / 11], [12, 11])
     np.testing.assert_allclose(spaces, wanted, rtol=1e-6)

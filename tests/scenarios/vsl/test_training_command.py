@@ -76,7 +76,11 @@ def test_errors_fall_along_the_learning_curve_which_is_drawn(tmp_path: Path, mon
     assert len({p.errors.forward_model_based for p in curve}) == 1  # the same test points
     assert len(list(curve_table(curve))) == 3
     assert seen == [1, 2]
-    monkeypatch.setattr(vsl_train_command, "learning_curve", lambda *_args: curve)
+
+    def known(*_given: object) -> Any:
+        return curve
+
+    monkeypatch.setattr(vsl_train_command, "learning_curve", known)
     monkeypatch.setattr(VslTraining, "measure", measured_at_once)
     result = call("--points", "400", "--curve", tmp_path / "a.b.png", "--out", tmp_path / "m.json")
     assert result.exit_code == 0, result.output

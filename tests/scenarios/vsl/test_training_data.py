@@ -62,6 +62,14 @@ def changed(name: str, change: Callable[[Any], Any]) -> Callable[[Any], Any]:
     return with_all
 
 
+def without_place(table: Any) -> Any:
+    return table.drop_columns(["p_WG_meas[2]"])
+
+
+def with_metadata(metadata: Any) -> Callable[[Any], Any]:
+    return lambda table: table.replace_schema_metadata(metadata)
+
+
 def about(**origin: Any) -> Callable[[Any], Any]:
     def change(table: Any) -> Any:
         kept = json.loads(table.schema.metadata[b"handover-vsl-data"])
@@ -73,7 +81,7 @@ def about(**origin: Any) -> Callable[[Any], Any]:
 @pytest.mark.parametrize(
     "change",
     [
-        pytest.param(lambda table: table.drop_columns(["p_WG_meas[2]"]), id="no place"),
+        pytest.param(without_place, id="no place"),
         pytest.param(with_column("i_meas[3]", [0.0] * 7 + [float("nan")] * 93), id="no numbers"),
         pytest.param(with_column("q_cmd[1]", ["x"] * 100), id="text"),
         pytest.param(with_column("order", [0] * 100), id="one place in the order"),
@@ -90,8 +98,8 @@ def about(**origin: Any) -> Callable[[Any], Any]:
         pytest.param(about(arm={"key": "k", "parameters": PARAMETERS | {"EI_0": 1.0}}), id="another parameter"),
         pytest.param(about(arm={"key": "k", "parameters": {}}), id="no parameters"),
         pytest.param(about(arm=None), id="no arm"),
-        pytest.param(lambda table: table.replace_schema_metadata(None), id="no metadata"),
-        pytest.param(lambda table: table.replace_schema_metadata({b"handover-vsl-data": b"{"}), id="no JSON"),
+        pytest.param(with_metadata(None), id="no metadata"),
+        pytest.param(with_metadata({b"handover-vsl-data": b"{"}), id="no JSON"),
     ],
 )
 def test_data_that_cannot_be_trained_on_is_refused(change: Callable[[Any], Any], tmp_path: Path, wording: Wording):

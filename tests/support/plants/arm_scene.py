@@ -9,7 +9,6 @@ from scipy.spatial.transform import Rotation
 
 from handover.cosim.blocks.plain_rotation import quaternion
 from handover.cosim.blocks.ports import Floats
-from handover.plants.free_flyer.rigid_body import Wrenches
 from handover.plants.free_flyer.robot.arm import Arm, Joints
 from handover.plants.free_flyer.robot.articulated_body import ArticulatedBody
 from handover.plants.free_flyer.robot.stopping_joints import JointLimits, StoppingJoints
@@ -37,7 +36,7 @@ def tumbling(within: JointLimits, q_J: Joints = (0.3, -0.4, 0.8)) -> StoppingJoi
 
 
 def mujoco_course(
-    q_J: Joints, start: "tuple[Floats, Floats]", push: Wrenches, tau_J: Joints, steps: int, dt: float
+    q_J: Joints, start: "tuple[Floats, Floats]", push: tuple[Any, Any, Any, Any], tau_J: Joints, steps: int, dt: float
 ) -> "tuple[Floats, list[Floats]]":
     """Return coordinates at the end, and G's place after each step of four of MuJoCo's; start is p_WB and v, w, v_J."""
     mujoco: Any = pytest.importorskip("mujoco")
