@@ -112,6 +112,14 @@ def test_dry_friction_holds_a_joint_up_to_its_torque_and_brings_it_to_a_standsti
     assert rest.q_J[0] > moved.q_J[0]
 
 
+def test_a_blow_at_a_limit_moves_a_joint_that_dry_friction_holds():
+    robot = tumbling(JointLimits((-9.0, -0.9, -9.0), (9.0, 0.9, 9.0), (0.3, 0.0, 0.0), (0.0,) * 3))
+    while robot.motion().q_J[1] < 0.9:
+        assert robot.motion().q_J[0] == 0.3
+        robot.advance(0.004, NOTHING, (0.0, 0.08, 0.0))
+    assert robot.motion().v_J[0] > 0.5
+
+
 def test_a_joint_without_range_does_not_turn_and_the_others_do():
     robot = tumbling(JointLimits((-9.0, -0.4, -9.0), (9.0, -0.4, 9.0), (0.0,) * 3, (0.0,) * 3))
     walk(robot, 50, PUSH, TORQUES)
