@@ -5,11 +5,12 @@ import shutil
 from collections.abc import Generator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pyarrow.parquet as pq
 import pytest
-from click.testing import CliRunner
 from support.campaigns import carried_out, short_plan
+from support.commands import call, data_in
 from support.in_process_pool import InProcessPool
 from support.sweep_process import without_times
 
@@ -20,7 +21,6 @@ from handover.scenarios.campaign.plan_check import prepared
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.campaign.table_writer import rebuild_table
 from handover.scenarios.campaign.worker_pool import JobResult, RunCounts, RunJob
-from handover.scenarios.cli.command import main
 
 PLAN = short_plan(repetitions=2)
 NAMES = [run.name for run in PLAN.runs()]
@@ -54,12 +54,6 @@ def test_each_run_has_a_row_in_the_plans_order(finished: Path):
     assert table.column("status").tolist() == ["done"] * 4
     assert sorted(p.name for p in (finished / "runs").iterdir()) == NAMES
     assert sorted(p.name for p in finished.iterdir()) == ["campaign.json", "fmus", "runs", "runs.parquet"]
-
-
-def test_what_is_done_is_not_begun_again(folder: CampaignFolder):
-    begun, counts = resume(folder)
-    assert begun == []
-    assert counts == [RunCounts(total=4, kept=4, ended=4)]
 
 
 def test_an_interrupted_campaign_goes_on_and_is_as_if_undisturbed(finished: Path, tmp_path: Path):
@@ -104,51 +98,38 @@ def test_a_lost_run_is_a_row_with_its_reason_and_tried_again(tmp_path: Path):
     assert CampaignTable.read(folder.table).column("status").tolist() == ["done"] * 4
 
 
-@pytest.mark.parametrize("content", [None, "{", "[]"])
-def test_a_run_whose_summary_is_damaged_is_done_anew(folder: CampaignFolder, content: str | None):
-    summary = folder.runs / NAMES[2] / "summary.json"
-    if content is None:
-        summary.unlink()
-    else:
-        summary.write_text(content)
-    assert resume(folder)[0] == [NAMES[2]]
-    assert len(CampaignTable.read(folder.table)) == 4
-
-
-def test_a_run_that_was_interrupted_is_none(folder: CampaignFolder):
-    summary = folder.runs / NAMES[2] / "summary.json"
-    summary.write_text(json.dumps({**json.loads(summary.read_text()), "complete": False}))
-    assert resume(folder)[0] == [NAMES[2]]
-
-
-def test_a_run_in_which_a_unit_failed_is_done(folder: CampaignFolder):
-    summary = folder.runs / NAMES[2] / "summary.json"
-    failed = {"complete": False, "success": False, "failure": {"kind": "x"}, "reason": "the hand broke"}
-    summary.write_text(json.dumps({**json.loads(summary.read_text()), **failed}))
+@pytest.mark.parametrize(
+    ("change", "done"),
+    [
+        (None, False),
+        ([], False),
+        ({"complete": False}, False),  # it was interrupted
+        ({"complete": False, "success": False, "failure": {"kind": "x"}, "reason": "the hand broke"}, True),
+    ],
+)
+def test_a_run_is_done_if_its_summary_says_so(change: Any, done: bool, folder: CampaignFolder):
+    run = folder.runs / NAMES[2]
+    content = {**data_in(run), **change} if change else change
+    (run / "summary.json").write_text("{" if change is None else json.dumps(content))
     begun, counts = resume(folder)
-    assert begun == []
-    assert counts == [RunCounts(total=4, kept=4, ended=4, failed=1)]
+    assert begun == ([] if done else [NAMES[2]])
     row = CampaignTable.read(folder.table).rows[2]
-    assert (row["status"], row["success"], row["reason"]) == ("failed", None, "the hand broke")
-
-
-@pytest.mark.parametrize("damage", ["lost", "torn"])
-def test_the_table_is_made_anew_from_the_runs(folder: CampaignFolder, damage: str):
-    before = CampaignTable.read(folder.table).rows
-    if damage == "lost":
-        folder.table.unlink()
+    if done:
+        assert counts == [RunCounts(total=4, kept=4, ended=4, failed=1)]
+        assert (row["status"], row["success"], row["reason"]) == ("failed", None, "the hand broke")
     else:
-        folder.table.write_bytes(folder.table.read_bytes()[:2000])
-    assert resume(folder)[0] == []
-    assert CampaignTable.read(folder.table).rows == before
+        assert row["status"] == "done"
 
 
-def test_left_overs_of_killed_runs_are_removed(folder: CampaignFolder):
+def test_what_is_done_is_not_begun_again_and_left_overs_of_killed_runs_are_removed(folder: CampaignFolder):
     left = folder.runs / f".{NAMES[0]}.abc"
     left.mkdir()
     (left / "signals.parquet.part").write_text("x")
-    resume(folder)
+    before = CampaignTable.read(folder.table).rows
+    folder.table.write_bytes(folder.table.read_bytes()[:2000])  # torn
+    assert resume(folder) == ([], [RunCounts(total=4, kept=4, ended=4)])
     assert not left.exists()
+    assert CampaignTable.read(folder.table).rows == before
 
 
 def test_more_repetitions_add_runs(folder: CampaignFolder):
@@ -166,24 +147,26 @@ def cut(folder: CampaignFolder, rows: int) -> bytes:
     return folder.table.read_bytes()
 
 
-@pytest.mark.parametrize("left", ["nothing", "no row", "a row", "damaged"])
-def test_a_rebuilt_table_is_as_the_campaign_itself_writes_it(left: str, finished: Path, folder: CampaignFolder):
-    if left == "nothing":
+def written(folder: CampaignFolder) -> tuple[int, int] | None:
+    """Return what changes if the table is written."""
+    return (folder.table.stat().st_mtime_ns, folder.table.stat().st_ino) if folder.table.exists() else None
+
+
+@pytest.mark.parametrize("left", [None, 0, 1, "damaged", 4])
+def test_a_rebuilt_table_is_as_the_campaign_itself_writes_it(
+    left: int | str | None, finished: Path, folder: CampaignFolder
+):
+    if left is None:
         folder.table.unlink()
-    elif left == "damaged":
+    elif isinstance(left, str):
         folder.table.write_bytes(b"PAR1")
     else:
-        cut(folder, rows=int(left == "a row"))
+        cut(folder, rows=left)
+    before = written(folder)
     rebuild_table(folder)
     expected = CampaignTable.read(finished).table
     assert CampaignTable.read(folder.table).table.equals(expected, check_metadata=True)
-
-
-def test_a_whole_table_is_not_written_again(folder: CampaignFolder):
-    before = folder.table.stat()
-    rebuild_table(folder)
-    assert folder.table.stat().st_mtime_ns == before.st_mtime_ns
-    assert folder.table.stat().st_ino == before.st_ino
+    assert (written(folder) == before) is (left == 4)  # a whole one is not written again
 
 
 def test_a_lost_run_stays_lost(tmp_path: Path):
@@ -195,19 +178,17 @@ def test_a_lost_run_stays_lost(tmp_path: Path):
     assert table.column("reason")[0] == "its worker went away"
 
 
-def test_a_table_is_left_alone_while_a_command_works_on_the_campaign(folder: CampaignFolder):
+@pytest.mark.parametrize("change", [None, {"versions": {"handover-cosim": "9.9"}}, {"scenario": "juggle"}])
+def test_a_table_is_left_while_a_command_works_on_it_or_of_another_version(
+    change: dict[str, object] | None, folder: CampaignFolder
+):
     before = cut(folder, rows=1)
-    with folder.held():
+    if change is None:
+        with folder.held():
+            rebuild_table(folder)
+    else:
+        (folder.path / "campaign.json").write_text(json.dumps({**data_in(folder.path, "campaign"), **change}))
         rebuild_table(folder)
-    assert folder.table.read_bytes() == before
-
-
-@pytest.mark.parametrize("change", [{"versions": {"handover-cosim": "9.9"}}, {"scenario": "juggle"}])
-def test_the_table_of_a_campaign_of_another_version_is_left(change: dict[str, object], folder: CampaignFolder):
-    before = cut(folder, rows=1)
-    file = folder.path / "campaign.json"
-    file.write_text(json.dumps({**json.loads(file.read_text(encoding="utf-8")), **change}), encoding="utf-8")
-    rebuild_table(folder)
     assert folder.table.read_bytes() == before
 
 
@@ -220,6 +201,5 @@ def test_the_page_shows_all_runs_that_are_done(folder: CampaignFolder):
 
 def page_of(folder: CampaignFolder) -> str:
     """Return what `handover report` writes."""
-    done = CliRunner().invoke(main, ["report", str(folder.path)])
-    assert done.exit_code == 0, done.output
+    assert call("report", folder.path).exit_code == 0
     return folder.report.read_text(encoding="utf-8").replace("\u00a0", " ")

@@ -12,7 +12,7 @@ from support.wording import Wording
 
 from handover.cosim.exceptions import RecordNotWritten
 from handover.cosim.files import folder_locked
-from handover.cosim.stepping.options import Algorithm, MasterOptions
+from handover.cosim.stepping.options import MasterOptions
 from handover.scenarios.campaign.folder import CampaignFolder, default_folder
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.execution.errors import PoolError
@@ -60,11 +60,9 @@ def test_it_holds_copies_of_the_fmus(folder: CampaignFolder, fmus: dict[str, Pat
     fmus["scene"].rename(fmus["scene"].with_suffix(".moved"))
     assert (folder.fmus / "scene.fmu").read_text() == "scene"
     assert folder.read()["units"]["scene"]["fmu"] == "scene.fmu"
-
-
-def test_a_damaged_copy_is_made_anew(folder: CampaignFolder, fmus: dict[str, Path]):
+    fmus["scene"].with_suffix(".moved").rename(fmus["scene"])
     (folder.fmus / "scene.fmu").write_text("half")
-    assert begin(folder, PLAN, fmus)["scene"].read_text() == "scene"
+    assert begin(folder, PLAN, fmus)["scene"].read_text() == "scene"  # a damaged copy is made anew
 
 
 def test_different_files_of_one_name_have_copies_of_their_own(tmp_path: Path, fmus: dict[str, Path]):
@@ -81,15 +79,12 @@ def test_different_files_of_one_name_have_copies_of_their_own(tmp_path: Path, fm
     "change",
     [
         {"scenario": "flyer_impedance", "fixed": {}, "points": [dict[str, str]()]},
-        {"points": [{"forward": "0.03"}]},
         {"points": [{"standoff": "0.1"}] * 2},
         {"fixed": {"thing": "paper_box_a"}},
-        {"fixed": {}},
         {"seed": 5},
         {"paired": True},
         {"repetitions": 1},
         {"experiment": "ir-table"},
-        {"options": MasterOptions(algorithm=Algorithm.JACOBI)},
         {"options": MasterOptions(pace=1)},
     ],
     ids=lambda change: " ".join(change),
@@ -113,25 +108,17 @@ def test_another_fmu_and_another_version_are_refused(folder: CampaignFolder, fmu
     fmus["scene"].write_text("another")
     assert "unit scene is scene.fmu (sha256 " in refusal(folder, PLAN, fmus)
     fmus["scene"].write_text("scene")
-    text = folder.read()
-    text["versions"]["numpy"] = "1.0"
-    (folder.path / "campaign.json").write_text(json.dumps(text))
+    (folder.path / "campaign.json").write_text(json.dumps(folder.read() | {"versions": {"numpy": "1.0"}}))
     assert "version of numpy is 1.0 there, " in refusal(folder, PLAN, fmus)
 
 
-@pytest.mark.parametrize(
-    ("damage", "text"),
-    [("{", "its campaign.json is damaged: "), ("[]", "Expected `object`"), ("{}", "missing required field")],
-)
-def test_a_damaged_campaign_json_is_refused(folder: CampaignFolder, fmus: dict[str, Path], damage: str, text: str):
-    (folder.path / "campaign.json").write_text(damage)
-    assert text in refusal(folder, PLAN, fmus)
-
-
-def test_each_member_of_campaign_json_is_of_a_declared_type(folder: CampaignFolder):
+def test_a_damaged_campaign_json_is_refused(folder: CampaignFolder, fmus: dict[str, Path]):
     file = folder.path / "campaign.json"
     written: dict[str, Any] = json.loads(file.read_text())
-    for name in written:
+    for damage, text in (("{", "its campaign.json is damaged: "), ("{}", "missing required field")):
+        file.write_text(damage)
+        assert text in refusal(folder, PLAN, fmus)
+    for name in written:  # each member is of a declared type
         file.write_text(json.dumps({**written, name: [[0]]}))
         with pytest.raises(InvalidRunFolder, match=name):
             folder.read()
@@ -148,13 +135,12 @@ def test_files_in_place_of_folders_and_folders_in_place_of_files_are_refused(
     assert refusal(folder, PLAN, fmus) == "runs.parquet is a folder, not a file; remove it"
 
 
-def test_a_folder_of_something_else_is_refused(tmp_path: Path, fmus: dict[str, Path]):
+def test_a_folder_of_something_else_and_a_second_command_are_refused(
+    folder: CampaignFolder, tmp_path: Path, fmus: dict[str, Path]
+):
     other = CampaignFolder(tmp_path / "built")
     assert "it is not empty and has no campaign.json" in refusal(other, PLAN, fmus)
     assert "there is a file of that name" in refusal(CampaignFolder(fmus["scene"]), PLAN, fmus)
-
-
-def test_a_second_command_is_refused(folder: CampaignFolder, fmus: dict[str, Path]):
     with folder_locked(folder.path):
         assert refusal(folder, PLAN, fmus) == f"another command is running this campaign (process {os.getpid()})"
 
@@ -167,28 +153,22 @@ def test_a_call_killed_before_it_wrote_its_campaign_is_no_obstacle(tmp_path: Pat
     assert folder.read()["scenario"] == "ir_grasp"
 
 
-def test_workers_that_are_refused_leave_no_folder(tmp_path: Path, fmus: dict[str, Path]):
+def test_workers_that_are_refused_and_a_full_disk_leave_no_folder(
+    tmp_path: Path, fmus: dict[str, Path], monkeypatch: pytest.MonkeyPatch
+):
     def refuse(path: Path) -> None:
         assert path.is_dir()
         raise PoolError("no")
 
-    folder = CampaignFolder(tmp_path / "a" / "b" / "c")
-    with pytest.raises(PoolError), folder.opened(PLAN, fmus, refuse):
-        pass
-    assert not (tmp_path / "a").exists()
-
-
-def test_a_disk_without_room_for_the_plan_leaves_no_folder(
-    tmp_path: Path, fmus: dict[str, Path], monkeypatch: pytest.MonkeyPatch
-):
-    def refuse(*_given: Any, **_options: Any) -> None:
+    def full(*_given: Any, **_options: Any) -> None:
         raise OSError(28, "No space left on device")
 
-    folder = CampaignFolder(tmp_path / "c")
-    monkeypatch.setattr("os.replace", refuse)
+    with pytest.raises(PoolError), CampaignFolder(tmp_path / "a" / "b" / "c").opened(PLAN, fmus, refuse):
+        pass
+    monkeypatch.setattr("os.replace", full)
     with pytest.raises(RecordNotWritten, match="No space left"):
-        begin(folder, PLAN, fmus)
-    assert not folder.path.exists()
+        begin(CampaignFolder(tmp_path / "a" / "d"), PLAN, fmus)
+    assert not (tmp_path / "a").exists()
 
 
 def test_without_a_folder_the_newest_incomplete_campaign_of_the_plan_goes_on(

@@ -11,7 +11,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
+from support.commands import call
+from support.cosim.native_units import native_fmu
 from support.in_process_pool import InProcessPool
 
 from handover.cosim.stepping.options import MasterOptions
@@ -20,11 +22,11 @@ from handover.scenarios.campaign.cluster import ClusterPool
 from handover.scenarios.campaign.run_server import RunServer
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.campaign.worker_pool import JobResult, RunJob, WorkerPool, read_message, write_message
-from handover.scenarios.cli.command import main
 from handover.scenarios.execution import supervisor
 
-CALL = ["sweep", "ir_grasp", "-p", "strategy=forward", "--repeat", "3", "--out", "c", "--no-report", "--workers", "2"]
-BEGINNING = "3 runs of ir_grasp on 2 workers into c\n"
+CALL = ("sweep", native_fmu("mass"), "--repeat", "3", "--out", "c", "--no-report", "--workers", "2")
+BEGINNING = f"3 runs of {CALL[1]} on 2 workers into c\n"
+GOES_ON = "1 of 3 runs done; run the same command again to resume"
 FULL = os.strerror(errno.ENOSPC)
 
 
@@ -42,7 +44,7 @@ def sweep(monkeypatch: pytest.MonkeyPatch, pool: WorkerPool) -> Result:
         yield pool
 
     monkeypatch.setattr(local_cluster, "local_cluster", given)
-    return CliRunner().invoke(main, CALL)
+    return call(*CALL)
 
 
 def interrupt(_job: RunJob) -> str:
@@ -74,10 +76,7 @@ def test_a_run_without_room_stops_it_and_what_is_done_stays(monkeypatch: pytest.
             raise AssertionError("no other run is waited for")
 
     result = sweep(monkeypatch, Full())
-    text = (
-        "c/runs/000_r0001 cannot be written: Disk quota exceeded; 1 of 3 runs done; "
-        "run the same command again to resume"
-    )
+    text = f"c/runs/000_r0001 cannot be written: Disk quota exceeded; {GOES_ON}"
     assert (result.exit_code, result.output) == (3, f"{BEGINNING}Error: {text}\n")
     assert CampaignTable.read(Path("c")).column("run").tolist() == ["000_r0000"]
 
@@ -89,7 +88,7 @@ def test_words_of_a_full_disk_stop_nothing(monkeypatch: pytest.MonkeyPatch):
     assert "cannot be written" not in result.output
 
 
-@pytest.mark.parametrize(("number", "full"), [(errno.ENOSPC, True), (errno.EDQUOT, True), (errno.EACCES, False)])
+@pytest.mark.parametrize(("number", "full"), [(errno.EDQUOT, True), (errno.EACCES, False)])
 def test_a_run_server_without_room_for_what_a_run_prints_answers(
     number: int, full: bool, here: Path, monkeypatch: pytest.MonkeyPatch
 ):
@@ -121,9 +120,6 @@ def test_a_table_that_cannot_be_written_stops(monkeypatch: pytest.MonkeyPatch):
 
     monkeypatch.setattr(os, "replace", refuse)
     result = sweep(monkeypatch, InProcessPool())
-    assert (result.exit_code, result.output) == (
-        3,
-        f"{BEGINNING}Error: c/runs.parquet cannot be written: No space left on device; "
-        "1 of 3 runs done; run the same command again to resume\n",
-    )
+    text = f"c/runs.parquet cannot be written: No space left on device; {GOES_ON}"
+    assert (result.exit_code, result.output) == (3, f"{BEGINNING}Error: {text}\n")
     assert sorted(p.name for p in Path("c").iterdir()) == ["campaign.json", "fmus", "runs"]

@@ -24,6 +24,8 @@ def test_a_median_has_its_bootstrapped_interval_and_is_made_once():
     found = results.median_interval(results.points[0], "moved")
     assert found == time_interval([0.1, 0.2, 0.4])
     assert results.median_interval(results.points[0], "moved") is found
+    nothing = moved(1, [math.nan, math.nan])
+    assert math.isnan(nothing.median(nothing.points[0], "moved"))
 
 
 @pytest.mark.parametrize(("points", "values"), [(1, [0.2, 0.2, 0.2]), (1, [0.1, 0.3]), (151, [0.1, 0.2, 0.3])])
@@ -45,31 +47,20 @@ def test_labels_have_the_names_of_numbers_and_of_classes_and_files_as_they_are()
     assert [namesakes.label(p) for p in namesakes.points] == ["my_own:Reflex", "old.my_own:Reflex"]
 
 
-def test_an_array_has_a_label_with_its_name_and_unit(tmp_path: Path):
-    soft = "impedance.stiffness_translation"
-    points = [{"p_WG_handover": "0,-0.07,0", soft: ",".join(f"{k}00010001")} for k in (1, 2)]
-    plan = CampaignPlan(scenario="flyer_robot_to_human", points=points)
-    folder = CampaignFolder(tmp_path / "c")
-    with folder.opened(plan, {"impedance": cached("ImpedanceController", 3)}, lambda _path: None):
-        pass
-    metadata = folder.read()
-    results = CampaignResults(metadata, table_of(metadata["points"], 1))
-    assert results.label(results.points[1]) == "impedance.stiffness translation 2,0,0,0,1,0,0,0,1 N/m"
-    assert results.named_value("p_WG_handover", "0,-0.07,0") == "p WG handover 0,-0.07,0 m"
-
-
 def test_units_parameters_have_the_units_that_their_fmus_declare(tmp_path: Path):
+    def results_in(path: Path, plan: CampaignPlan, fmus: dict[str, Path]) -> CampaignResults:
+        folder = CampaignFolder(path)
+        with folder.opened(plan, fmus, lambda _path: None):
+            metadata = folder.read()
+        return CampaignResults(metadata, table_of(metadata["points"], 1))
+
     plan = CampaignPlan(scenario="ir_grasp", points=[{"scene.wrist_speed": value} for value in ("0.05", "0.1", "0.2")])
-    folder = CampaignFolder(tmp_path / "c")
-    with folder.opened(plan, {"scene": cached("GraspScene", 3)}, lambda _path: None):
-        pass
-    metadata = folder.read()
-    assert metadata["parameter_units"] == {"scene.wrist_speed": "m/s"}
-    results = CampaignResults(metadata, table_of(metadata["points"], 1))
+    results = results_in(tmp_path / "c", plan, {"scene": cached("GraspScene", 3)})
     assert layout_of(results).title == "scene.wrist speed (m/s)"
     assert results.label(results.points[0]) == "scene.wrist speed 0.05 m/s"
-
-
-def test_there_is_no_median_of_no_values():
-    results = moved(1, [math.nan, math.nan])
-    assert math.isnan(results.median(results.points[0], "moved"))
+    soft = "impedance.stiffness_translation"
+    arrays = [{"p_WG_handover": "0,-0.07,0", soft: ",".join(f"{k}00010001")} for k in (1, 2)]
+    plan = CampaignPlan(scenario="flyer_robot_to_human", points=arrays)
+    results = results_in(tmp_path / "d", plan, {"impedance": cached("ImpedanceController", 3)})
+    assert results.label(results.points[1]) == "impedance.stiffness translation 2,0,0,0,1,0,0,0,1 N/m"
+    assert results.named_value("p_WG_handover", "0,-0.07,0") == "p WG handover 0,-0.07,0 m"

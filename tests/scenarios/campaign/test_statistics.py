@@ -20,23 +20,11 @@ from handover.scenarios.campaign.statistics import (
 )
 
 
-def test_an_interval_of_successes_is_that_of_clopper_and_pearson():
-    interval = success_interval(4, 20)
-    assert (interval.low, interval.high) == pytest.approx((0.0573340, 0.4366140), abs=1e-6)  # R's binom.test(4, 20)
-
-
-@pytest.mark.parametrize("n", [1, 2, 7, 80])
+@pytest.mark.parametrize("n", [1, 7, 80])
 def test_an_interval_of_successes_is_that_which_scipy_finds_by_searching(n: int):
     for k in range(n + 1):
         ours, searched = success_interval(k, n), binomtest(k, n).proportion_ci(method="exact")
         assert (ours.low, ours.high) == pytest.approx((searched.low, searched.high), abs=1e-9)
-
-
-@pytest.mark.parametrize("n", [1, 3, 15, 80])
-def test_an_interval_without_a_failure_or_a_success_has_its_closed_form(n: int):
-    none, all_ = success_interval(0, n), success_interval(n, n)
-    assert (none.low, none.high) == pytest.approx((0.0, 1.0 - 0.025 ** (1.0 / n)))
-    assert (all_.low, all_.high) == pytest.approx((0.025 ** (1.0 / n), 1.0))
 
 
 @pytest.mark.parametrize(("successes", "n"), [(0, 0), (4, 3), (-1, 3)])
@@ -55,20 +43,12 @@ def test_a_bootstrapped_mean_of_many_values_has_about_the_interval_of_the_normal
 
 
 def test_a_bootstrap_leans_to_the_side_on_which_values_are_spread():
-    interval = time_interval(np.random.default_rng(2).exponential(1.0, 40), np.mean)
     x = np.random.default_rng(2).exponential(1.0, 40)
+    interval = time_interval(x, np.mean)
     assert interval is not None
+    assert interval == time_interval(x, np.mean)
+    assert time_interval([1.0, 2.0, float("nan")]) is None  # fewer than three values say nothing
     assert interval.high - np.mean(x) > 1.1 * (np.mean(x) - interval.low)
-
-
-def test_a_bootstrap_of_the_same_values_is_the_same():
-    x = [1.0, 2.5, 2.0, 4.0, 3.5]
-    assert time_interval(x) == time_interval(x)
-
-
-def test_a_bootstrap_of_fewer_than_three_values_says_nothing():
-    assert time_interval([1.0, 2.0]) is None
-    assert time_interval([1.0, 2.0, float("nan")]) is None
 
 
 @pytest.mark.parametrize(("values", "bounds"), [([2.0, 2.0, 2.0, 2.0], (2.0, 2.0)), ([1.0, 1.0, 1.0, 2.0], (1.0, 2.0))])
@@ -91,25 +71,16 @@ def test_pairs_that_differ_decide_the_paired_test():
     assert not paired_test(second, first).first_is_better
 
 
-def test_five_pairs_that_differ_are_too_few_for_any_verdict():
+def test_five_pairs_that_differ_are_too_few_for_any_verdict_and_none_say_nothing():
     assert not paired_test([True] * 5, [False] * 5).first_is_better
     assert paired_test([True] * 6, [False] * 6).first_is_better
-
-
-def test_pairs_that_never_differ_say_nothing():
     assert paired_test([True, False], [True, False]).p == 1.0
-
-
-def test_pairs_of_unequal_numbers_are_refused():
     with pytest.raises(ValueError):  # noqa: PT011 (zip's own)
         paired_test([True], [True, False])
 
 
-def test_the_lady_tasting_tea():
+def test_the_lady_tasting_tea_and_few_trials_of_theirs():
     assert two_proportions(3, 4, 1, 4) == pytest.approx(34 / 70)
-
-
-def test_with_three_trials_of_theirs_hardly_a_count_can_be_distinguished():
     assert compatible_counts(2, 3, 3) == (0, 3)
     assert compatible_counts(0, 4, 4) == (0, 3)  # 4 of 4: p = 2 / C(8, 4)
 
@@ -185,10 +156,3 @@ def test_signs_flipped_are_counted_as_by_brute_force():
         p = np.mean([total >= abs(sum(differences)) for total in flipped])
         assert sign_flip_test(differences) == pytest.approx(p, abs=1e-12)
     assert sign_flip_test([]) == 1.0
-
-
-@pytest.mark.parametrize(("more", "less"), [(10, 0), (7, 2), (60, 31)])
-def test_flipped_signs_of_pairs_are_mcnemars_exact_test(more: int, less: int):
-    pairs = [(True, False)] * more + [(False, True)] * less + [(True, True)] * 5
-    differences = [int(a) - int(b) for a, b in pairs]
-    assert sign_flip_test(differences) == pytest.approx(paired_test(*map(list, zip(*pairs, strict=True))).p, rel=1e-9)

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from support.clusters import scheduler, worker
 from support.processes import lives, parent, program, servers, until
-from support.scenarios.sample_jobs import bad_job, job
+from support.scenarios.sample_jobs import bad_job, quick_job
 
 from handover.scenarios.campaign.local_cluster import connect_cluster
 from handover.scenarios.campaign.scheduler import scheduler_address
@@ -46,7 +46,7 @@ def nanny(address: str, tmp_path_factory: pytest.TempPathFactory) -> Generator[i
 
 def test_threads_of_a_worker_execute_runs_in_parallel(address: str, nanny: int, tmp_path: Path):
     runs = tmp_path / "runs"
-    jobs = [job(runs, f"run_{i}", seed=i) for i in range(4)]
+    jobs = [quick_job(runs, f"run_{i}", seed=i) for i in range(4)]
     jobs.append(bad_job(runs, "Crashes", tmp_path))
     with connect_cluster(scheduler_address(address.removeprefix("tcp://"))) as pool:
         assert pool.workers == 2
@@ -72,26 +72,27 @@ def test_a_command_that_is_killed_leaves_no_run_on_the_cluster(address: str, nan
     until(lambda: list(runs.iterdir()) == [])
 
 
-def test_a_worker_of_another_version_is_refused(address: str, tmp_path: Path):
-    other = tmp_path / "handover_cosim-9.9.dist-info"
-    other.mkdir()
-    (other / "METADATA").write_text("Metadata-Version: 2.1\nName: handover-cosim\nVersion: 9.9\n")
+@pytest.mark.parametrize(
+    ("file", "text", "told"),
+    [
+        (
+            "handover_cosim-9.9.dist-info/METADATA",
+            "Metadata-Version: 2.1\nName: handover-cosim\nVersion: 9.9\n",
+            r"has other versions: handover-cosim 9\.9 \(here ",
+        ),
+        ("handover.py", "", r"cannot run this package: .*handover\.scenarios"),
+    ],
+)
+def test_a_worker_of_another_version_or_without_this_package_is_refused(
+    file: str, text: str, told: str, address: str, tmp_path: Path
+):
+    (tmp_path / file).parent.mkdir(exist_ok=True)
+    (tmp_path / file).write_text(text)
     places = f"{tmp_path}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
     with (
         worker(tmp_path, address, PYTHONPATH=places),
         connect_cluster(address) as pool,
-        pytest.raises(PoolError, match=r"worker tcp://[\d.:]+ has other versions: handover-cosim 9\.9 \(here "),
-    ):
-        pool.check(tmp_path)
-
-
-def test_a_worker_without_this_package_is_refused(address: str, tmp_path: Path):
-    (tmp_path / "handover.py").touch()
-    places = f"{tmp_path}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
-    with (
-        worker(tmp_path, address, PYTHONPATH=places),
-        connect_cluster(address) as pool,
-        pytest.raises(PoolError, match=r"worker tcp://[\d.:]+ cannot run this package: .*handover\.scenarios"),
+        pytest.raises(PoolError, match=rf"worker tcp://[\d.:]+ {told}"),
     ):
         pool.check(tmp_path)
 
@@ -114,7 +115,7 @@ def test_workers_that_are_killed_are_replaced(address: str, nanny: int, tmp_path
     runs = tmp_path / "runs"
     with connect_cluster(address) as pool:
         names: list[str] = []
-        for result in pool.run_jobs([job(runs, f"run_{i}", seed=i) for i in range(4)]):
+        for result in pool.run_jobs([quick_job(runs, f"run_{i}", seed=i) for i in range(4)]):
             if not names:
                 os.kill(parent(servers(nanny)[0]), signal.SIGKILL)
             assert result.lost == ""

@@ -3,16 +3,17 @@
 import io
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from support.cosim.planted import planted_pickle
-from support.scenarios.sample_jobs import job
+from support.scenarios.sample_jobs import quick_job
 
 from handover.cosim.blocks.block import InvalidState
 from handover.cosim.stepping.options import AdaptiveStep, Algorithm, Extrapolation, MasterOptions
 from handover.scenarios.campaign.worker import ServerLost, ServerProcess
-from handover.scenarios.campaign.worker_pool import JobResult, RunJob, read_message, write_message
+from handover.scenarios.campaign.worker_pool import JobResult, read_message, write_message
 
 
 def sent(message: bytes) -> io.BytesIO:
@@ -20,15 +21,9 @@ def sent(message: bytes) -> io.BytesIO:
 
 
 def test_jobs_and_results_come_as_they_were_sent(tmp_path: Path):
-    options = MasterOptions(
-        algorithm=Algorithm.NEWTON,
-        extrapolation=Extrapolation.LINEAR,
-        adaptive=AdaptiveStep(uncontrolled=("a.y", "b.y")),
-        call_limit=3.0,
-    )
-    whole = RunJob(
-        name="r", scenario="s", parameters=("a=1",), seed=2**70, fmus={"u": "f"}, runs=str(tmp_path), options=options
-    )
+    adaptive = AdaptiveStep(uncontrolled=("a.y", "b.y"))
+    options = MasterOptions(algorithm=Algorithm.NEWTON, extrapolation=Extrapolation.LINEAR, adaptive=adaptive)
+    whole = replace(quick_job(tmp_path), seed=2**70, fmus={"u": "f"}, parameters=("a=1",), options=options)
     pipe = io.BytesIO()
     for message in ((whole, "folder"), JobResult(name="r", lost="é", no_room="x")):
         write_message(pipe, message)
@@ -55,14 +50,10 @@ def test_a_pickle_in_a_pipe_is_refused_and_not_executed(tmp_path: Path):
     assert not mark.exists()
 
 
-@pytest.mark.parametrize("framed", [True, False])
-def test_a_run_server_ends_at_a_pickle(framed: bool, tmp_path: Path):
+def test_a_run_server_ends_at_a_pickle(tmp_path: Path):
     planted, mark = planted_pickle(tmp_path)
-    server = subprocess.run(
-        [sys.executable, "-m", "handover.scenarios.campaign.run_server"],
-        input=sent(planted).getvalue() if framed else planted,
-        capture_output=True,
-    )
+    program = [sys.executable, "-m", "handover.scenarios.campaign.run_server"]
+    server = subprocess.run(program, input=sent(planted).getvalue(), capture_output=True, check=False)
     assert server.returncode == 1
     assert server.stderr.decode().splitlines()[-1].startswith("handover.cosim.blocks.block.InvalidState: ")
     assert not mark.exists()
@@ -79,6 +70,6 @@ def test_a_worker_ends_a_server_that_answers_a_pickle(tmp_path: Path, monkeypatc
     monkeypatch.setattr(subprocess, "Popen", start_other)
     server = ServerProcess()
     with pytest.raises(ServerLost):
-        server.run_job(job(tmp_path, "run"), lambda: True)
+        server.run_job(quick_job(tmp_path), lambda: True)
     assert not server.lives
     assert not mark.exists()

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 from support.campaigns import carried_out, short_plan
-from support.clusters import scheduler, worker
 from support.cosim.native_units import native_fmu
 from support.sweep_process import ended, runs_in, sweeping, wait_for, without_times, workers_of
 
@@ -18,61 +17,29 @@ POINTS, REPETITIONS = 4, 4
 RUNS = POINTS * REPETITIONS
 
 
-@pytest.fixture(scope="module")
-def call() -> list[str]:
-    """What is given to `handover sweep`: runs of half a second in which a unit computes nothing for long."""
-    fmu = str(native_fmu("mass"))
-    return [fmu, f"m=1:4:{POINTS}", "-p", "f=1", "--repeat", str(REPETITIONS), "--pace", "2", "--no-report"]
-
-
-@pytest.fixture(scope="module")
-def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    plan = short_plan(points=[{"m": str(m)} for m in range(1, POINTS + 1)], repetitions=REPETITIONS)
-    return carried_out(plan, tmp_path_factory.mktemp("undisturbed") / "c").path
-
-
-def expect_whole(out: Path, undisturbed: Path) -> None:
-    """Expect each run once, as without disturbance, and nothing besides."""
-    table = CampaignTable.read(out)
-    assert len(table) == len(set(table.column("run"))) == len(set(table.column("seed"))) == RUNS
-    assert set(table.column("status")) == {"done"}
-    assert {p.name for p in (out / "runs").iterdir()} == set(table.column("run"))
-    assert without_times(out) == without_times(undisturbed)
-
-
-def test_a_worker_that_is_killed_costs_no_run(call: list[str], undisturbed: Path, tmp_path: Path):
-    """Of a cluster that the user runs."""
-    out = tmp_path / "c"
-    with (
-        scheduler(tmp_path) as address,
-        worker(tmp_path, address) as nanny,
-        worker(tmp_path, address),
-        sweeping(*call, "--scheduler", address, "--out", out) as going,
-    ):
-        wait_for(lambda: len(runs_in(out)) >= RUNS // 4, going)
-        before = runs_in(out)
-        workers_of(nanny)[0].kill()
-        status, _, errors = ended(going)
-    assert status == 0, errors
-    assert before.items() <= runs_in(out).items()
-    expect_whole(out, undisturbed)
-
-
-def test_a_command_that_is_killed_goes_on_with_the_same_call(call: list[str], undisturbed: Path, tmp_path: Path):
+def test_a_command_that_is_killed_goes_on_with_the_same_call(tmp_path: Path):
     """And as it goes on, one of its workers is killed."""
+    plan = short_plan(points=[{"m": str(m)} for m in range(1, POINTS + 1)], repetitions=REPETITIONS)
+    undisturbed = carried_out(plan, tmp_path / "undisturbed").path
     out = tmp_path / "c"
-    with sweeping(*call, "--workers", "2", "--out", out) as going:
+    call = [str(native_fmu("mass")), f"m=1:4:{POINTS}", "-p", "f=1", "--repeat", str(REPETITIONS), "--pace", "2"]
+    call += ["--no-report", "--workers", "2", "--out", str(out)]
+    with sweeping(*call) as going:
         wait_for(lambda: len(runs_in(out)) >= RUNS // 4 and CampaignFolder(out).table.exists(), going)
         going.send_signal(signal.SIGKILL)
         going.wait()
     before = runs_in(out)
     assert RUNS // 4 <= len(before) < RUNS
     assert len(CampaignTable.read(out)) <= len(before)
-    with sweeping(*call, "--workers", "2", "--out", out) as going:
+    with sweeping(*call) as going:
         wait_for(lambda: len(runs_in(out)) >= RUNS // 2, going)
         workers_of(going.pid)[0].kill()
         status, value, errors = ended(going)
     assert status == 0, errors
     assert f"{RUNS} of {RUNS} runs done" in value
     assert before.items() <= runs_in(out).items()
-    expect_whole(out, undisturbed)
+    table = CampaignTable.read(out)
+    assert len(table) == len(set(table.column("run"))) == len(set(table.column("seed"))) == RUNS
+    assert set(table.column("status")) == {"done"}
+    assert {p.name for p in (out / "runs").iterdir()} == set(table.column("run"))
+    assert without_times(out) == without_times(undisturbed)

@@ -11,8 +11,9 @@ from pathlib import Path
 import psutil
 import pytest
 from support.processes import family, lives, parent, program, servers, until
-from support.scenarios.sample_jobs import bad_job, job
+from support.scenarios.sample_jobs import bad_job, quick_job
 
+from handover.scenarios.campaign import local_cluster as cluster_module
 from handover.scenarios.campaign.local_cluster import local_cluster
 from handover.scenarios.campaign.worker_pool import JobResult, RunJob, WorkerPool, cores
 
@@ -43,7 +44,7 @@ def going(runs: Path) -> bool:
 
 
 def test_all_are_answered_and_one_that_fails_ends_no_other(pool: WorkerPool, runs: Path, tmp_path: Path):
-    jobs = [*(job(runs, f"run_{i}", seed=i) for i in range(5)), bad_job(runs, "Crashes", tmp_path)]
+    jobs = [*(quick_job(runs, f"run_{i}", seed=i) for i in range(5)), bad_job(runs, "Crashes", tmp_path)]
     jobs.append(bad_job(runs, "IsKilled", tmp_path, "killed"))
     pool.check(runs)
     results = results_of(pool, jobs)
@@ -55,7 +56,7 @@ def test_all_are_answered_and_one_that_fails_ends_no_other(pool: WorkerPool, run
 
 
 def test_a_killed_worker_is_replaced_and_its_run_begun_anew(pool: WorkerPool, runs: Path):
-    jobs = [job(runs, f"run_{i}", seed=i) for i in range(4)]
+    jobs = [quick_job(runs, f"run_{i}", seed=i) for i in range(4)]
     names: list[str] = []
     for result in pool.run_jobs(jobs):
         if not names:
@@ -71,12 +72,12 @@ def test_a_run_that_always_takes_its_worker_with_it_is_given_up(pool: WorkerPool
     (result,) = pool.run_jobs([bad_job(runs, "KillsItsWorker", tmp_path)])
     assert result.lost == "its worker was lost 4 times: killed, or out of memory"
     until(lambda: list(runs.iterdir()) == [])  # the last worker's server sees to that when its worker is gone
-    assert results_of(pool, [job(runs)])[0].lost == ""
+    assert results_of(pool, [quick_job(runs)])[0].lost == ""
 
 
 def test_an_iteration_that_is_left_ends_its_runs(pool: WorkerPool, runs: Path, tmp_path: Path):
     hanging = [bad_job(runs, "Hangs", tmp_path, f"hangs_{i}") for i in range(4)]
-    results = pool.run_jobs([job(runs), *hanging])
+    results = pool.run_jobs([quick_job(runs), *hanging])
     assert next(iter(results)).name == "run"
     results.close()
     assert servers(os.getpid()) == []
@@ -90,10 +91,11 @@ def test_only_this_machine_can_speak_to_it(pool: WorkerPool):  # noqa: ARG001 (i
     assert heard == {"127.0.0.1"}
 
 
-def test_by_default_there_is_a_worker_for_each_core():
+def test_by_default_there_is_a_worker_for_each_core(monkeypatch: pytest.MonkeyPatch):
     assert cores() == len(os.sched_getaffinity(0))
+    monkeypatch.setattr(cluster_module, "cores", lambda: 1)
     with local_cluster(None) as pool:
-        assert pool.workers == cores()
+        assert pool.workers == 1
 
 
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGKILL, -9), (signal.SIGINT, 130)])

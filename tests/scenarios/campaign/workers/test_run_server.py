@@ -9,16 +9,15 @@ import time
 import zipfile
 from collections.abc import Generator
 from dataclasses import replace
-from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import CliRunner
+from support.commands import call, data_in
 from support.cosim.native_units import native_fmu
 from support.processes import children, lives, until
 from support.rewritten_archive import DESCRIPTION, rewritten
-from support.scenarios.sample_jobs import bad_job, job
+from support.scenarios.sample_jobs import bad_job, job, quick_job
 
 from handover.cosim.python_process import code_command
 from handover.cosim.record.reader import Record
@@ -28,10 +27,6 @@ from handover.scenarios.campaign.plan import PlannedRun
 from handover.scenarios.campaign.run_server import load_modules
 from handover.scenarios.campaign.table import row_of
 from handover.scenarios.campaign.worker import NotWanted, ServerLost, ServerProcess
-from handover.scenarios.campaign.worker_pool import RunJob
-from handover.scenarios.cli.command import main
-from handover.scenarios.reporting.run_page import write_run_page
-from handover.scenarios.results.run_folder import RunFolder
 
 slow = pytest.mark.slow
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks for processes in /proc")
@@ -56,45 +51,29 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def summary_in(runs: Path, name: str = "bad") -> dict[str, Any]:
     """Return the summary of the only run in a folder."""
     assert [p.name for p in runs.iterdir()] == [name]
-    return json.loads((runs / name / "summary.json").read_text())
+    return data_in(runs / name)
 
 
-@pytest.mark.parametrize(
-    ("scenario", "parameters"),
-    [("ir_grasp", ()), pytest.param("helix_handover", ("patience=1",), marks=slow)],
-)
-def test_the_signals_are_those_of_the_same_run_by_itself(
-    scenario: str, parameters: tuple[str, ...], server: ServerProcess, tmp_path: Path
+def test_the_signals_are_those_of_the_same_run_by_itself_also_if_it_is_executed_twice(
+    server: ServerProcess, tmp_path: Path
 ):
     alone, runs = tmp_path / "alone", tmp_path / "runs"
-    chosen = [text for parameter in parameters for text in ("-p", parameter)]
-    CliRunner().invoke(main, ["run", scenario, *chosen, "--seed", "3", "--no-report", "--out", str(alone)])
-    assert server.run_job(job(runs, "run", *parameters, scenario=scenario), yes).lost == ""
+    call("run", "ir_grasp", "--seed", "3", "--no-report", "--out", alone)
+    for _ in range(2):
+        assert server.run_job(job(runs), yes).lost == ""
+    assert [p.name for p in runs.iterdir()] == ["run"]
     assert (runs / "run" / "signals.parquet").read_bytes() == (alone / "signals.parquet").read_bytes()
-    assert {p.name for p in (runs / "run").iterdir()} == {p.name for p in alone.iterdir()}
-    assert {"run.json", "signals.parquet", "summary.json"} <= {p.name for p in (runs / "run").iterdir()}
-    assert not (runs / "run" / "figures").exists()
+    assert {p.name for p in (runs / "run").iterdir()} == {"run.json", "signals.parquet", "summary.json"}
 
 
 def test_a_file_whose_unit_crashes_takes_its_run_alone(server: ServerProcess, tmp_path: Path):
     runs, file = tmp_path / "runs", str(native_fmu("crashes_in_step", 3))
-    runs.mkdir()
     for name, at, reason in (("bad", "0.25", "crashed"), ("good", "9", "ran to 1 s")):
-        of_file = RunJob(
-            name=name, scenario=file, parameters=(f"at={at}",), seed=1, fmus={}, runs=str(runs),
-            options=MasterOptions(), stop=Fraction(1),
-        )  # fmt: skip
+        of_file = replace(quick_job(runs, name), scenario=file, parameters=(f"at={at}",))
         assert server.run_job(of_file, yes).lost == ""
-        summary = json.loads((runs / name / "summary.json").read_text())
+        summary = data_in(runs / name)
         assert reason in summary["reason"]
         assert (summary["failure"] is None) is (name == "good")
-
-
-def test_a_unit_that_fails_is_in_the_summary(server: ServerProcess, built: Path, tmp_path: Path):
-    assert server.run_job(bad_job(tmp_path / "runs", "Raises", built), yes).lost == ""
-    summary = summary_in(tmp_path / "runs")
-    assert (summary["success"], summary["failure"]["kind"]) == (False, "error")
-    assert "a sensor broke" in summary["reason"]
 
 
 @pytest.mark.parametrize(
@@ -116,19 +95,19 @@ def test_a_unit_that_does_not_start_is_in_the_summary(
     row = row_of(run, tmp_path / "runs" / "bad")
     assert row is not None
     assert (row.status, row.success) == ("failed", None)
-    write_run_page(RunFolder.of_run(tmp_path / "runs" / "bad"))
-    page = (tmp_path / "runs" / "bad" / "report.html").read_text(encoding="utf-8")
-    assert summary["reason"] in page.replace("\u00a0", " ")  # numbers are tied to their units
 
 
-@pytest.mark.parametrize(("reflex", "kind"), [("Crashes", "crash"), pytest.param("Hangs", "hang", marks=slow)])
-def test_a_unit_that_does_not_come_back_ends_its_run_only(
+@pytest.mark.parametrize(
+    ("reflex", "kind"), [("Raises", "error"), ("Crashes", "crash"), pytest.param("Hangs", "hang", marks=slow)]
+)
+def test_a_unit_that_fails_or_does_not_come_back_ends_its_run_only(
     reflex: str, kind: str, server: ServerProcess, built: Path, tmp_path: Path
 ):
     limit = 0.5 if kind == "hang" else None  # a crash takes longer on a loaded machine
     assert server.run_job(bad_job(tmp_path / "runs", reflex, built, call_limit=limit), yes).lost == ""
     summary = summary_in(tmp_path / "runs")
-    assert (summary["failure"]["kind"], summary["failure"]["instance"]) == (kind, "reflex")
+    assert (summary["success"], summary["failure"]["kind"], summary["failure"]["instance"]) == (False, kind, "reflex")
+    assert ("a sensor broke" in summary["reason"]) is (kind == "error")
     assert 0.0 < summary["cpu_seconds"] < 60.0
     assert Record(tmp_path / "runs" / "bad" / "signals.parquet").time[-1] == pytest.approx(0.09)
     assert server.lives
@@ -166,44 +145,25 @@ def test_what_a_run_prints_is_kept_beside_its_record(server: ServerProcess, buil
 
 
 @slow
-def test_a_run_that_was_executed_twice_is_there_once(server: ServerProcess, tmp_path: Path):
-    for _ in range(2):
-        assert server.run_job(job(tmp_path / "runs"), yes).lost == ""
-    assert [p.name for p in (tmp_path / "runs").iterdir()] == ["run"]
-
-
-@slow
-def test_a_server_that_is_killed_takes_its_run_with_it(built: Path, tmp_path: Path):
-    server, seen = ServerProcess(), list[int]()
-
-    def kill() -> bool:
-        if not seen and list((tmp_path / "runs").glob(".bad.*/signals.tail")):
-            seen.extend(children(server.pid))
-            os.kill(server.pid, signal.SIGKILL)
-        return True
-
-    with pytest.raises(ServerLost, match="ended with status -9"):
-        server.run_job(bad_job(tmp_path / "runs", "Hangs", built), kill)
-    assert len(seen) == 1
-    until(lambda: not lives(seen[0]))
-    assert list((tmp_path / "runs").iterdir()) == []
-    assert not server.lives
-
-
-@slow
-def test_a_run_that_is_not_wanted_any_more_is_ended(built: Path, tmp_path: Path):
+@pytest.mark.parametrize(("killed", "error"), [(True, ServerLost), (False, NotWanted)])
+def test_a_server_that_is_killed_or_whose_run_is_not_wanted_any_more_takes_its_run_with_it(
+    killed: bool, error: type[Exception], built: Path, tmp_path: Path
+):
     server, seen = ServerProcess(), list[int]()
 
     def wanted() -> bool:
-        if list((tmp_path / "runs").glob(".bad.*/signals.tail")):
+        if not seen and list((tmp_path / "runs").glob(".bad.*/signals.tail")):
             seen.extend(children(server.pid))
-        return not seen
+            if killed:
+                os.kill(server.pid, signal.SIGKILL)
+        return killed or not seen
 
-    with pytest.raises(NotWanted):
+    with pytest.raises(error, match="ended with status -9" if killed else None):
         server.run_job(bad_job(tmp_path / "runs", "Hangs", built), wanted)
     assert len(seen) == 1
     until(lambda: not any(map(lives, (server.pid, *seen))))
     assert list((tmp_path / "runs").iterdir()) == []
+    assert not server.lives
 
 
 @slow
@@ -221,10 +181,10 @@ def test_a_run_that_is_stopped_for_a_while_does_not_hang(server: ServerProcess, 
         return True
 
     # paced, so that the run lasts longer than the time between two calls of stop_once
-    limited = replace(job(tmp_path / "runs"), options=MasterOptions(call_limit=0.5, pace=5.0))
+    limited = replace(quick_job(tmp_path / "runs"), options=MasterOptions(call_limit=0.5, pace=1.0))
     assert server.run_job(limited, stop_once).lost == ""
     assert len(stopped) == 1
-    summary = json.loads((tmp_path / "runs" / "run" / "summary.json").read_text())
+    summary = data_in(tmp_path / "runs" / "run")
     assert (summary["complete"], summary["failure"]) == (True, None)
 
 
@@ -237,7 +197,7 @@ def test_runs_are_served_where_pandas_is_not_installed(tmp_path: Path, monkeypat
     assert subprocess.run(code_command("import pandas"), capture_output=True, check=False).returncode == 1
     server = ServerProcess()
     try:
-        assert server.run_job(job(tmp_path / "runs", "run", scenario="ir_grasp"), yes).lost == ""
+        assert server.run_job(quick_job(tmp_path / "runs"), yes).lost == ""
     finally:
         server.end()
 
@@ -246,10 +206,10 @@ def test_runs_are_served_where_pandas_is_not_installed(tmp_path: Path, monkeypat
 def test_the_modules_of_our_fmus_are_loaded_for_all_runs_but_those_of_others_are_not(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    ours = cached("IrReflex", 3)
+    ours = cached("Push", 3)
     with zipfile.ZipFile(ours) as archive:
         unit = json.loads(archive.read("resources/unit.json"))
-    own = json.dumps({**unit, "block": "my_package.reflex:Reflex"}).encode()
+    own = json.dumps({**unit, "block": "my_package.push:Push"}).encode()
     other = rewritten(ours, tmp_path / "other.fmu", lambda name, data: own if name == "resources/unit.json" else data)
     foreign = rewritten(ours, tmp_path / "foreign.fmu", lambda name, data: data if name == DESCRIPTION else None)
     module = f"{unit['prefix']}.handover.fmus.slave"

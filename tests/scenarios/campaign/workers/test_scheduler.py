@@ -8,8 +8,9 @@ from collections.abc import Generator
 from pathlib import Path
 
 import pytest
-from support.clusters import closed_port, scheduler
+from support.clusters import scheduler
 from support.in_process_pool import InProcessPool
+from support.wording import Wording
 
 from handover.scenarios.campaign import local_cluster
 from handover.scenarios.campaign import scheduler as of_scheduler
@@ -22,7 +23,6 @@ from handover.scenarios.execution.errors import PoolError
 def refused(address: str) -> str:
     with pytest.raises(PoolError) as caught:
         scheduler_address(address)
-    assert "\n" not in str(caught.value)
     return str(caught.value)
 
 
@@ -51,26 +51,11 @@ def other_server(request: pytest.FixtureRequest) -> Generator[str, None, None]:
 
 
 @pytest.mark.parametrize(
-    ("address", "text"),
-    [
-        ("nonsense", "scheduler 'nonsense' has no port"),
-        ("", "scheduler '' has no host"),
-        ("tcp://", "scheduler 'tcp://' has no host"),
-        ("tcp://127.0.0.1", "scheduler 'tcp://127.0.0.1' has no port"),
-        ("127.0.0.1:99999", "scheduler '127.0.0.1:99999': Port out of range 0-65535"),
-        ("tcp://127.0.0.1:abc", "scheduler 'tcp://127.0.0.1:abc': Port could not be cast to integer value as 'abc'"),
-        ("http://127.0.0.1:80", "scheduler 'http://127.0.0.1:80': there is no protocol 'http', only "),
-        ("[::1", "scheduler '[::1': Invalid IPv6 URL"),
-    ],
+    "address",
+    ["nonsense", "", "tcp://127.0.0.1", "127.0.0.1:99999", "tcp://127.0.0.1:abc", "http://127.0.0.1:80", "[::1"],
 )
-def test_a_malformed_address_is_refused(address: str, text: str):
-    assert refused(address).startswith(text)
-
-
-@pytest.mark.slow
-def test_an_address_where_nothing_is_is_refused():
-    address = f"tcp://127.0.0.1:{closed_port()}"
-    assert refused(address).startswith(f"no scheduler can be reached at {address}: ")
+def test_a_malformed_address_is_refused(address: str, wording: Wording):
+    wording.check(refused(address))
 
 
 @pytest.mark.slow
@@ -112,26 +97,17 @@ def test_workers_are_those_of_the_scheduler_that_has_answered(checked: bool, mon
     assert str(config) == "the workers of h:1"
 
 
-@pytest.fixture
-def never() -> Generator[threading.Event, None, None]:
-    """An event that is not set until the end of the test."""
-    event = threading.Event()
-    yield event
-    event.set()
-
-
-def test_it_is_called_in_another_thread():
-    assert call_with_timeout(threading.get_ident, 60.0) != threading.get_ident()
-
-
-def test_what_it_raises_is_raised_in_the_caller():
+def test_it_is_called_in_another_thread_and_what_it_raises_is_raised_in_the_caller():
     def ask() -> None:
         raise ValueError("no such worker")
 
+    assert call_with_timeout(threading.get_ident, 60.0) != threading.get_ident()
     with pytest.raises(ValueError, match="no such worker"):
         call_with_timeout(ask, 60.0)
 
 
-def test_a_call_without_an_answer_times_out(never: threading.Event):
+def test_a_call_without_an_answer_times_out():
+    never = threading.Event()
     with pytest.raises(TimeoutError, match=r"^no answer within 0\.1 s$"):
         call_with_timeout(lambda: never.wait(60.0), 0.1)
+    never.set()

@@ -2,12 +2,13 @@
 
 import logging
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 import pytest
 from distributed import Client
-from support.scenarios.sample_jobs import job
+from support.scenarios.sample_jobs import job, quick_job
 
 from handover.scenarios.campaign import worker
 from handover.scenarios.campaign.run_job import run_job
@@ -24,7 +25,7 @@ def test_a_job_of_a_batch_that_has_been_ended_starts_no_server(tmp_path: Path, m
         return started[-1]
 
     def lost(client: Client, batch: str) -> str:
-        arguments: list[Any] = [job(tmp_path / "runs"), batch, versions()]
+        arguments: list[Any] = [quick_job(tmp_path / "runs"), batch, versions()]
         return client.submit(worker.run_job_on_worker, *arguments, pure=False).result(timeout=60).lost
 
     monkeypatch.setattr(worker, "ServerProcess", started_server)
@@ -40,16 +41,15 @@ def test_a_job_of_a_batch_that_has_been_ended_starts_no_server(tmp_path: Path, m
     assert [p.name for p in (tmp_path / "runs").iterdir()] == ["run"]
 
 
-def test_units_of_ours_tell_of_their_calls(tmp_path: Path, caplog: pytest.LogCaptureFixture):
+def test_units_of_ours_tell_of_their_calls_and_a_campaigns_runs_in_their_logs(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, capsys: pytest.CaptureFixture[str]
+):
     """What Python's logging takes is for every program that uses the library."""
+    given = replace(job(tmp_path / "runs", "r", "strategy=blind"), stop=Fraction(1, 10))
     with caplog.at_level(logging.DEBUG, logger="handover"):
-        run_job(job(tmp_path / "runs", "r", "strategy=blind"), tmp_path / "runs" / "r")
+        run_job(given, tmp_path / "runs" / "r")
     lines = [record.getMessage() for record in caplog.records if record.name == "handover.units"]
     assert "scene: [OK] fmi3EnterInitializationMode: initialising at t = 0 s" in lines
     assert any("fmi3Terminate: ends at t" in line for line in lines), lines
-
-
-def test_a_campaign_s_runs_tell_in_their_logs(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
-    of_campaign = job(tmp_path / "runs", "r", "strategy=blind")
-    run_job(replace(of_campaign, log_level="info"), tmp_path / "runs" / "r")
+    run_job(replace(given, log_level="info"), tmp_path / "runs" / "s")
     assert "info: units are stepped to t = " in capsys.readouterr().err
