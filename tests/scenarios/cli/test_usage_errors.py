@@ -68,6 +68,9 @@ run ran
 run a
 run x.ssp --input u.csv
 run missing.ssp
+run broken.ssp
+resume here
+resume nothing
 run two.ssp
 run two.ssp --stop 2 --unit a=1 --seed 3
 run two.ssp --stop 2 --start 2
@@ -183,6 +186,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     shutil.copyfile(cached("HandoverPartner", 3), place / "hand.fmu")
     (place / "cut.fmu").write_bytes((place / "mass.fmu").read_bytes()[:500])
     write_archive(place / "unclosed.fmu", {"modelDescription.xml": b"<fmiModelDescription"})
+    write_archive(place / "broken.ssp", {"SystemStructure.ssd": b"<ssd:System"})
     turned = native_fmu("clerk", 3)
     described_otherwise(turned, place / "turned.fmu", lambda text: text.replace('startTime="0"', 'startTime="2"'))
     return place
