@@ -1,39 +1,38 @@
-"""A live page that this process serves, and connections to it."""
+"""A live page that a thread of this process serves."""
 
 import asyncio
-import json
+import contextlib
 import socket
-from collections.abc import Awaitable, Callable
-from typing import Any, TypeVar
-
-from websockets.asyncio.client import ClientConnection, connect
+import threading
+from collections.abc import Generator
+from http.client import HTTPConnection, HTTPResponse
 
 from handover.scenarios.live.live_page import LivePage
 from handover.scenarios.live.server import serve
 
-P = TypeVar("P", bound=LivePage)
+
+@contextlib.contextmanager
+def served(page: LivePage) -> Generator[tuple[str, asyncio.AbstractEventLoop], None, None]:
+    """Serve a page on a free port; yield its address, and the loop in which it is served."""
+    loop, over = asyncio.new_event_loop(), asyncio.Event()
+
+    async def wait() -> None:
+        await over.wait()
+
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        serving = threading.Thread(target=loop.run_until_complete, args=[serve(page, wait(), listening)])
+        serving.start()
+        try:
+            yield f"http://127.0.0.1:{listening.getsockname()[1]}/", loop
+        finally:
+            loop.call_soon_threadsafe(over.set)
+            serving.join()
+            loop.close()
 
 
-def with_page(page: P, act: Callable[[P, str], Awaitable[None]]) -> None:
-    """Serve a page on a free port while something is done with it, by its `host:port`."""
-
-    async def work() -> None:
-        with socket.create_server(("127.0.0.1", 0)) as listening:
-            host = f"127.0.0.1:{listening.getsockname()[1]}"
-            await serve(page, _acting(page, act, host), listening)
-
-    asyncio.run(work())
-
-
-async def _acting(page: P, act: Callable[[P, str], Awaitable[None]], host: str) -> None:
-    await act(page, host)
-
-
-def opened(host: str, path: str, **options: Any) -> connect:
-    """Connect as the page does."""
-    return connect(f"ws://{host}/{path}", open_timeout=60.0, origin=f"http://{host}", **options)  # type: ignore
-
-
-async def answer(to: ClientConnection) -> dict[str, Any]:
-    """Return the next message."""
-    return json.loads(await asyncio.wait_for(to.recv(), 60.0))
+def answered(address: str, path: str, **headers: str) -> tuple[HTTPResponse, bytes]:
+    """Return what a server answers a path, as it is written, and its content."""
+    with contextlib.closing(HTTPConnection(address[7:].rstrip("/"), timeout=60.0)) as asking:
+        asking.request("GET", path, headers=headers)
+        got = asking.getresponse()
+        return got, got.read()

@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -10,6 +10,7 @@ import pytest
 from support.wording import Wording
 
 from handover.cosim.master.live_control import LiveControl
+from handover.scenarios.experiment.live_inputs import Pushable
 from handover.scenarios.free_flyer.robot_wiring import PUSHES
 from handover.scenarios.live.commands import (
     LONGEST,
@@ -24,96 +25,68 @@ from handover.scenarios.live.commands import (
     signal_names,
 )
 
+STRONG = [replace(push, greatest=40.0) for push in PUSHES]
+PUSH = {"body": "robot", "force": [1.0, 0.0, 0.0], "point": [0.1, 0.0, 0.0]}
+
 
 def chosen(value: Any) -> object:
     return choice_of(value, ["force"], seeded=True)
 
 
-def pushed(value: Any) -> object:
-    return push_of(value, PUSHES)
+def pushed(known: Sequence[Pushable] = PUSHES, **other: Any) -> object:
+    return push_of({**PUSH, **other}, known)
 
 
-def choosing(value: Any) -> object:
-    return signal_names(value, ["a.y"])
+def controlled(name: str, value: Any = None, control: LiveControl | None = None) -> None:
+    control_run(control or LiveControl.in_memory(1.0), Command(name, value))
 
 
-def of_first_run(value: Any) -> object:
-    return run_number(value, [1])
+REFUSED: dict[str, Callable[[], object]] = {
+    "cut off": lambda: parse_command("{"),
+    "a list": lambda: parse_command("[]"),
+    "nothing": lambda: parse_command("{}"),
+    "no number of JSON": lambda: parse_command('{"command": "pace", "value": NaN}'),
+    "another member": lambda: parse_command('{"command": "pause", "more": 1}'),
+    "too long": lambda: parse_command(" " * (LONGEST + 1)),
+    "a pace backwards": lambda: controlled("pace", -1),
+    "a pace beyond all": lambda: controlled("pace", 1001.0),
+    "an unknown signal": lambda: signal_names(["secret"], ["a.y"]),
+    "seven signals": lambda: signal_names(["a.y"] * 7, ["a.y"]),
+    "no numbers of plots": lambda: plot_numbers("all"),
+    "no parameters": lambda: chosen("all"),
+    "an unknown parameter": lambda: chosen({"parameters": {"secret": "1"}}),
+    "a parameter that is no text": lambda: chosen({"parameters": {"force": 3}}),
+    "a negative seed": lambda: chosen({"parameters": {}, "seed": -1}),
+    "another option": lambda: chosen({"parameters": {}, "out": "/tmp"}),
+    "a run that is not over": lambda: run_number(7, [1]),
+    "a push of another body": lambda: pushed(body="object"),
+    "a push too strong": lambda: pushed(force=[4, 4, 0]),
+    "a push too strong for its body": lambda: pushed(STRONG, force=[41, 0, 0]),
+    "a push at no point": lambda: pushed(point=[0, 0]),
+    "a push far away": lambda: pushed(point=[0, 0, 6]),
+    "a push at a huge point": lambda: pushed(point=[0, 0, 1e300]),
+    "a push of a text": lambda: push_of("robot", PUSHES),
+    "a push where there is none": lambda: push_of(None, ()),
+}
 
 
-def pushing_nothing(value: Any) -> object:
-    return push_of(value, ())
-
-
-def controlled(name: str) -> Callable[[Any], object]:
-    return lambda value: control_run(LiveControl.in_memory(1.0), Command(name, value))
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        pytest.param("{", id="cut off"),
-        pytest.param("[]", id="a list"),
-        pytest.param("{}", id="nothing"),
-        pytest.param('{"command": "pace", "value": NaN}', id="no number of JSON"),
-        pytest.param('{"command": "pause", "more": 1}', id="another member"),
-        pytest.param(" " * (LONGEST + 1), id="too long"),
-    ],
-)
-def test_what_is_no_command_is_refused(text: str, wording: Wording):
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_is_no_command_or_has_no_right_value_is_refused(case: str, wording: Wording):
     with pytest.raises(InvalidCommand) as refused:
-        parse_command(text)
+        REFUSED[case]()
     wording.check(refused.value)
 
 
-@pytest.mark.parametrize(
-    ("taken_by", "value"),
-    [
-        pytest.param(controlled("pace"), -1, id="a pace backwards"),
-        pytest.param(controlled("pace"), 1001.0, id="a pace beyond all"),
-        pytest.param(choosing, ["secret"], id="an unknown signal"),
-        pytest.param(choosing, ["a.y"] * 7, id="seven signals"),
-        pytest.param(plot_numbers, "all", id="no numbers of plots"),
-        pytest.param(chosen, "all", id="no parameters"),
-        pytest.param(chosen, {"parameters": {"secret": "1"}}, id="an unknown parameter"),
-        pytest.param(chosen, {"parameters": {"force": 3}}, id="a parameter that is no text"),
-        pytest.param(chosen, {"parameters": {}, "seed": -1}, id="a negative seed"),
-        pytest.param(chosen, {"parameters": {}, "out": "/tmp"}, id="another option"),
-        pytest.param(of_first_run, 7, id="a run that is not over"),
-        pytest.param(pushed, {"body": "object", "point": [0, 0, 0], "force": [1, 0, 0]}, id="a push of another body"),
-        pytest.param(pushed, {"body": "robot", "point": [0, 0, 0], "force": [4, 4, 0]}, id="a push too strong"),
-        pytest.param(pushed, {"body": "robot", "point": [0, 0], "force": [1, 0, 0]}, id="a push at no point"),
-        pytest.param(pushed, {"body": "robot", "point": [0, 0, 6], "force": [1, 0, 0]}, id="a push far away"),
-        pytest.param(
-            pushed, {"body": "robot", "point": [0, 0, 1e300], "force": [1, 0, 0]}, id="a push at a huge point"
-        ),
-        pytest.param(pushed, "robot", id="a push of a text"),
-        pytest.param(pushing_nothing, None, id="a push where there is none"),
-    ],
-)
-def test_a_value_that_is_not_right_is_refused(taken_by: Callable[[Any], object], value: Any, wording: Wording):
-    with pytest.raises(InvalidCommand) as refused:
-        taken_by(value)
-    wording.check(refused.value)
-
-
-def test_commands_control_a_run():
+def test_commands_control_a_run_and_push_as_strongly_as_a_body_bears():
     control = LiveControl.in_memory(1.0)
     for name, value in (("pace", 0), ("pause", None)):
         control_run(control, parse_command(json.dumps({"command": name, "value": value})))
     assert (control.pace, control.paused) == (math.inf, True)
-    control_run(control, Command("step", None))
+    controlled("step", control=control)
     assert control.take_step()
-    control_run(control, Command("stop", None))
+    controlled("stop", control=control)
     assert (control.stop, control.paused) == (True, False)
-
-
-def test_a_push_is_as_strong_as_its_body_bears():
-    strong = [replace(push, greatest=40.0) for push in PUSHES]
-    asked = {"body": "robot", "force": [30.0, 0, 0], "point": [0.1, 0, 0]}
-    push = push_of(asked, strong)
+    push = push_of({**PUSH, "force": [40.0, 0, 0]}, STRONG)
     assert push is not None
-    assert (push.force, push.point) == ((30.0, 0.0, 0.0), (0.1, 0.0, 0.0))
-    with pytest.raises(InvalidCommand, match="40 N"):
-        push_of({**asked, "force": [41.0, 0, 0]}, strong)
-    assert push_of(None, strong) is None
+    assert (push.force, push.point) == ((40.0, 0.0, 0.0), (0.1, 0.0, 0.0))
+    assert push_of(None, STRONG) is None

@@ -10,14 +10,15 @@ from pathlib import Path
 
 import pytest
 from support.cosim.native_units import native_fmu
-from support.served_live_page import answer, opened, with_page
+from support.live_pages import connected, told
+from support.served_live_page import served
+from websockets.exceptions import ConnectionClosed
 
 from handover.cosim.master.live_control import LiveControl
 from handover.cosim.master.master import Master
 from handover.cosim.record.reader import Record
 from handover.cosim.record.recorder import Recorder
 from handover.cosim.system.system import System
-from handover.plants.free_flyer.hand.hand_kinematics import STRAIGHT
 from handover.scenarios.experiment.live_inputs import LedHand
 from handover.scenarios.live.hand_messages import HandSample
 from handover.scenarios.live.hand_seat import HandSeat
@@ -28,7 +29,7 @@ from handover.scenarios.live.shown_run import ShownRun
 from handover.scenarios.live.watched_run import WatchedRun
 
 LED = LedHand("person", (-0.4, 0.1, -0.05), 0.9)
-AT_REST = HandSample(LED.p_WH_0, (1.0, 0.0, 0.0, 0.0), STRAIGHT, closed=False, stamp=0.0)
+AT_REST = HandSample.at_rest(LED)
 
 
 class LedSeat(HandSeat):
@@ -66,34 +67,31 @@ def shown_run(folder: Path) -> ShownRun:
 
 
 def test_a_run_whose_hand_nobody_leads_from_outside_has_no_seat_for_one(tmp_path: Path):
-    async def act(_page: LivePage, host: str) -> None:
-        async with opened(host, "hand") as device:
-            assert "hand=outside" in (await answer(device))["refused"]
-            await device.wait_closed()
-            assert device.close_code == 1008
-
     page = LivePage()
     page.shown = replace(shown_run(tmp_path), seat=None)
-    with_page(page, act)
-
-
-async def cancelled(page: Told, shown: ShownRun) -> None:
-    showing = asyncio.create_task(page.show(shown))
-    await page.begins.wait()
-    showing.cancel()
-    with contextlib.suppress(asyncio.CancelledError):
-        await showing
+    with served(page) as (address, _), connected(address, "hand") as device:
+        assert "hand=outside" in told(device, "refused")
+        with pytest.raises(ConnectionClosed):
+            device.recv(60.0)
+        assert device.close_code == 1008
 
 
 def test_the_report_is_written_where_showing_the_run_is_cancelled(tmp_path: Path):
-    shown = shown_run(tmp_path)
+    async def cancelled() -> None:
+        page = Told()
+        showing = asyncio.create_task(page.show(shown_run(tmp_path)))
+        await page.begins.wait()
+        showing.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await showing
+
     (tmp_path / "run").mkdir()
-    asyncio.run(cancelled(Told(), shown))
+    asyncio.run(cancelled())
     assert json.loads((tmp_path / "run" / "inputs.json").read_text(encoding="utf-8"))["samples"] == {"test": 1}
 
 
 def test_the_end_is_told_where_the_report_cannot_be_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
-    shown, page = shown_run(tmp_path), Told()
-    asyncio.run(page.show(shown, lambda: True))  # whose folder is not there
+    page = Told()
+    asyncio.run(page.show(shown_run(tmp_path), lambda: True))  # whose folder is not there
     assert "ended" in str(page.told[-1])
     assert "inputs.json" in capsys.readouterr().err

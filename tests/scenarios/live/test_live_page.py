@@ -22,7 +22,6 @@ from support.live_pages import (
     live_run,
     process_with,
     shown,
-    time_passes,
     told,
 )
 from support.opened_page import wait_until
@@ -31,7 +30,6 @@ from support.wording import Wording
 
 from handover.cosim.record.reader import Record
 from handover.fmus.build import cached
-from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
 from handover.scenarios.ir_grasp.parameters import Parameters
 from handover.scenarios.results.pictures import read_picture_files
@@ -39,13 +37,6 @@ from handover.scenarios.results.pictures import read_picture_files
 TITLES = "[...document.querySelectorAll('#plots h3')].map(heading => heading.textContent)"
 REACHED = "document.getElementById('reached').value"
 SERVER = "handover.scenarios.live"
-
-
-def test_the_readme_shows_and_plays_with_scenarios_that_there_are():
-    readme = (Path(__file__).parents[3] / "README.md").read_text(encoding="utf-8")
-    named = re.findall(r"^\.venv/bin/handover (?:run (\w+) --live|play (\w+))$", readme, re.MULTILINE)
-    assert len(named) == 2
-    assert {live or played for live, played in named} <= SCENARIOS.keys()
 
 
 def test_a_run_waits_for_its_page_and_goes_on_without_it_if_the_pages_server_ends(tmp_path: Path):
@@ -197,7 +188,6 @@ def test_the_page_shows_what_the_cameras_see_and_the_run_is_the_same(browser: Br
     ("how", "given"),
     [
         pytest.param(signal.SIGINT, (), id="interrupted"),
-        pytest.param(signal.SIGKILL, (), id="killed"),
         pytest.param(signal.SIGKILL, ("--checkpoint", "0.1"), id="killed after a checkpoint"),
     ],
 )
@@ -218,16 +208,3 @@ def test_the_page_of_a_run_that_is_ended_from_outside_says_what_is_left_of_it(
     wording.check(re.sub(r"\d+\.\d+ s", "T s", ended["reason"]))
     until(lambda: not server.is_running(), 300.0)
     assert not scratch.exists()
-
-
-@pytest.mark.slow
-def test_a_page_whose_server_ends_says_that_the_run_goes_on_and_offers_nothing(browser: Browser, tmp_path: Path):
-    with (
-        live_run(tmp_path / "live", "--pace", "0.5", "--stop", "100", scenario=cached("Push", 3)) as (address, run),
-        shown(browser, address) as page,
-    ):
-        time_passes(page, 0.02)
-        process_with(run, SERVER).kill()
-        page.get_by_text("is lost: what serves this page has ended, and the run goes on without it.").wait_for()
-        assert page.locator("#pace").is_disabled()
-        assert run.poll() is None

@@ -19,7 +19,6 @@ from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.cli.command import main
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.runner import run_task
-from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.results.task import InputSources
 
 _STOP = 0.4
@@ -41,7 +40,6 @@ def pushed_run(name: str, out: Path, forces: Mapping[str, Sequence[float] | Floa
 @pytest.mark.parametrize(
     ("name", "given", "unit"),
     [
-        pytest.param("flyer_two_robots", (), "robot_1", marks=pytest.mark.slow),
         pytest.param("flyer_two_robots", (), "robot_2", marks=pytest.mark.slow),
         pytest.param("flyer_arm_impedance", ("begin=30",), "robot", marks=pytest.mark.slow),
         ("helix_reach", (), "arm"),
@@ -72,17 +70,9 @@ def test_each_of_its_bodies_yields_to_a_push_and_the_scene_shows_it(
         assert set(push.labels) <= {body.label for body in scene.bodies}
         arrows = [line.points[-1] for line in scene.lines if line.label == "force of the push"]
         assert sum(bool(np.isfinite(points).all()) for points in arrows) == 1
+        colours = {line.label: line.colour for line in (*scene.lines, *scene.fixed) if line.radii is None}
+        assert len(set(colours.values())) == len(colours)
     assert (f"{unit}.f_Q" in {f"{unit}.{push.force}" for push in pushes}) == (name == "flyer_arm_impedance")
-
-
-@pytest.mark.slow
-def test_lines_and_points_of_a_pushed_helix_are_told_apart_by_their_colours(tmp_path: Path):
-    record = pushed_run("helix_handover", tmp_path / "run", {"arm.f_P": [0.0, 0.5, 0.0]})
-    scene = SCENARIOS["helix_handover"]().replay(parse_parameters(SCENARIOS["helix_handover"], ()), record)
-    assert scene is not None
-    colours = {line.label: line.colour for line in (*scene.lines, *scene.fixed) if line.radii is None}
-    assert colours.keys() == {"ball, estimated", "gripper, estimated", "force of the push", "cameras"}
-    assert len(set(colours.values())) == len(colours)
 
 
 @pytest.mark.parametrize(

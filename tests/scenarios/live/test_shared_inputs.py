@@ -18,50 +18,27 @@ def inputs_in(folder: Path) -> SharedInputs:
     return SharedInputs.create(folder / "inputs", SIZES, ["person.age"])
 
 
-def test_inputs_hold_their_start_values_and_are_old_until_a_sample_comes(tmp_path: Path):
-    sources = inputs_in(tmp_path).sources()
-    assert set(sources) == {*SIZES, "person.age"}
-    assert sources["person.p"].at(0.0) is None
-    assert sources["person.age"].at(0.0) == [NEVER]
-
-
 def test_a_sample_is_used_with_its_age_and_what_it_does_not_say_holds_on(tmp_path: Path):
     written = inputs_in(tmp_path)
     sources = SharedInputs(tmp_path / "inputs").sources()
-    assert written.set({"person.p": [1.0, 2.0, 3.0]}, time.monotonic() - 0.5) == 1
-    assert sources["person.closed"].at(0.0) is None
-    np.testing.assert_array_equal(sources["person.p"].at(0.0), [1.0, 2.0, 3.0])
-    (age,) = sources["person.age"].at(0.0) or [0.0]
-    assert 0.5 <= age < 30.0
-    assert written.set({"person.closed": True}, time.monotonic()) == 2
-    np.testing.assert_array_equal(sources["person.closed"].at(0.016), [1.0])
+    assert set(sources) == {*SIZES, "person.age"}
+    assert sources["person.p"].at(0.0) is None
+    assert sources["person.age"].at(0.0) == [NEVER]
+    stamps = [time.monotonic() - age for age in (0.5, 0.1)]
+    assert written.set({"person.p": [1.0, 2.0, 3.0]}, stamps[0]) == 1
+    assert sources["person.closed"].at(0.016) is None
     np.testing.assert_array_equal(sources["person.p"].at(0.016), [1.0, 2.0, 3.0])
-    assert (sources["person.age"].at(0.016) or [NEVER])[0] < age
-
-
-def test_all_inputs_of_a_communication_point_are_of_one_sample(tmp_path: Path):
-    inputs = inputs_in(tmp_path)
-    sources = inputs.sources()
-    inputs.set({"person.p": [1.0, 1.0, 1.0], "person.closed": 0.0}, time.monotonic())
-    sources["person.p"].at(0.5)
-    inputs.set({"person.p": [2.0, 2.0, 2.0], "person.closed": 1.0}, time.monotonic())
-    np.testing.assert_array_equal(sources["person.closed"].at(0.5), [0.0])
-    np.testing.assert_array_equal(sources["person.closed"].at(0.516), [1.0])
-
-
-def test_shared_inputs_tell_which_samples_were_used_when(tmp_path: Path):
-    inputs = inputs_in(tmp_path)
-    sources = SharedInputs(tmp_path / "inputs").sources()
-    stamps = [time.monotonic() - age for age in (0.3, 0.2, 0.1)]
-    for k, stamp in enumerate(stamps):
-        inputs.set({"person.closed": k % 2}, stamp)
-        for source in sources.values():
-            source.at(0.016 * k)
-    uses = inputs.uses()
-    np.testing.assert_array_equal(uses["t"], [0.0, 0.016, 0.032])
-    np.testing.assert_array_equal(uses["number"], [1, 2, 3])
-    np.testing.assert_array_equal(uses["stamp"], stamps)
-    assert (np.diff(inputs.ages()) < 0.0).all()
+    (age,) = sources["person.age"].at(0.016) or [0.0]
+    assert 0.5 <= age < 30.0
+    assert written.set({"person.closed": True}, stamps[1]) == 2
+    assert sources["person.closed"].at(0.016) is None, "all of a communication point is of one sample"
+    np.testing.assert_array_equal(sources["person.closed"].at(0.032), [1.0])
+    np.testing.assert_array_equal(sources["person.p"].at(0.032), [1.0, 2.0, 3.0])
+    assert (sources["person.age"].at(0.032) or [NEVER])[0] < age
+    uses = written.uses()
+    for name, used in (("t", [0.016, 0.032]), ("number", [1, 2]), ("stamp", stamps)):
+        np.testing.assert_array_equal(uses[name], used)
+    assert (np.diff(written.ages()) < 0.0).all()
 
 
 def test_of_a_long_run_the_last_uses_are_told(tmp_path: Path):

@@ -1,15 +1,11 @@
 """A webcam leads the hand: its files, and the way from a camera's pictures to a run, with a stand-in for MediaPipe."""
 
-import asyncio
-import contextlib
 import hashlib
 import json
 import threading
-import zipfile
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from html import unescape
-from http.client import HTTPConnection
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from itertools import pairwise
 from pathlib import Path
@@ -19,7 +15,7 @@ import pytest
 from click.testing import CliRunner
 from support.live_pages import LIVE, live_run, shown
 from support.opened_page import launched, wait_until
-from support.served_live_page import with_page
+from support.served_live_page import answered, served
 from support.webcam_files import camera_of, write_files, write_video
 from support.wording import Wording
 
@@ -42,73 +38,34 @@ OUTSIDE = ("-p", "hand=outside")
 TOLD = "document.getElementById('hand-told').value"
 
 
-def test_files_have_their_hashes_and_nothing_else_of_the_folder_is_served(tmp_path: Path):
+def badly_deflated(model: bytes) -> bytes:
+    """Return a model whose first part is said to be compressed, with a kind of block that there is none of."""
+    method = model.index(b"PK\x01\x02") + 10
+    return (model[:method] + b"\x08" + model[method + 1 :]).replace(b"\x1c", b"\x06", 1)
+
+
+MODELS: dict[str, Callable[[bytes], bytes]] = {
+    "empty": lambda _: b"",
+    "a page": lambda _: b"<html>not found</html>",
+    "cut off": lambda model: model[:60],
+    "damaged": lambda model: model.replace(b"TFL3", b"TGL3", 1),
+    "whose stream is damaged": badly_deflated,
+    "of no landmarks": lambda model: model.replace(MODEL_PARTS[1].encode(), b"x" * len(MODEL_PARTS[1])),
+}
+
+
+@pytest.mark.parametrize("case", [*MODELS, "missing"])
+def test_what_is_not_what_its_name_says_is_refused(case: str, tmp_path: Path, wording: Wording):
     folder = write_files(tmp_path / "vision")
-    files = WebcamFiles.read(folder)
-    assert files.hashes() == {name: hashlib.sha256((folder / name).read_bytes()).hexdigest() for name in FILES}
-    assert {route.path for route in files.routes()} == {
-        "/webcam/worker.js",
-        "/webcam/vision_bundle.mjs",
-        "/webcam/vision_wasm_module_internal.js",
-        "/webcam/vision_wasm_module_internal.wasm",
-        "/webcam/hand_landmarker.task",
-    }
-
-
-def _zip_without_landmarks(path: Path) -> None:
-    with zipfile.ZipFile(path, "w") as bundle:
-        bundle.writestr(MODEL_PARTS[0], b"\x1c\0\0\0TFL3")
-
-
-def _write(content: bytes) -> Callable[[Path], object]:
-    return lambda path: path.write_bytes(content)
-
-
-def _put_folder(path: Path) -> None:
-    path.unlink()
-    path.mkdir()
-
-
-def _cut(path: Path) -> None:
-    path.write_bytes(path.read_bytes()[:60])
-
-
-def _damage_stream(path: Path) -> None:
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as bundle:
-        for name in MODEL_PARTS:
-            bundle.writestr(name, b"\x1c\0\0\0TFL3" + bytes(range(256)))
-    content = bytearray(path.read_bytes())
-    content[30 + len(MODEL_PARTS[0])] |= 0b110  # a kind of block that there is none of
-    path.write_bytes(bytes(content))
-
-
-def _damage(path: Path) -> None:
-    content = bytearray(path.read_bytes())
-    content[content.index(b"TFL3") + 1] ^= 1
-    path.write_bytes(bytes(content))
-
-
-@pytest.mark.parametrize(
-    ("name", "change"),
-    [
-        pytest.param(MODEL, Path.unlink, id="a model that is missing"),
-        pytest.param(MODEL, _write(b""), id="an empty model"),
-        pytest.param(MODEL, _write(b"<html>not found</html>"), id="a page for a model"),
-        pytest.param(MODEL, _cut, id="a model cut off"),
-        pytest.param(MODEL, _damage, id="a damaged model"),
-        pytest.param(MODEL, _damage_stream, id="a model whose stream is damaged"),
-        pytest.param(MODEL, _zip_without_landmarks, id="a model of no landmarks"),
-        pytest.param(WASM, _write(b"<html>"), id="a page for a WebAssembly"),
-        pytest.param(WASM, _put_folder, id="a folder for a WebAssembly"),
-        pytest.param(LOADER, _write(b"var a;"), id="a loader that loads nothing"),
-        pytest.param(BUNDLE, _write(b"export class FaceLandmarker {}"), id="a bundle of faces"),
-    ],
-)
-def test_what_is_not_what_its_name_says_is_refused(
-    tmp_path: Path, name: str, change: Callable[[Path], object], wording: Wording
-):
-    folder = write_files(tmp_path / "vision")
-    change(folder / name)
+    if case in MODELS:
+        (folder / MODEL).write_bytes(MODELS[case]((folder / MODEL).read_bytes()))
+        (folder / WASM).write_bytes(b"<html>")
+    else:
+        for name in (MODEL, WASM):
+            (folder / name).unlink()
+        (folder / WASM).mkdir()
+        (folder / LOADER).write_text("var a;")
+        (folder / BUNDLE).write_text("export class FaceLandmarker {}")
     with pytest.raises(InvalidWebcamFiles) as refused:
         WebcamFiles.read(folder)
     wording.check(refused.value)
@@ -146,13 +103,10 @@ def makers_of_the_package() -> Generator[tuple[str, list[str]], None, None]:
             self.send_response(200)
             self.end_headers()
 
-    server = HTTPServer(("127.0.0.1", 0), Makers)
-    threading.Thread(target=server.serve_forever, daemon=True).start()
-    try:
+    with HTTPServer(("127.0.0.1", 0), Makers) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
         yield f"http://127.0.0.1:{server.server_port}/report", asked
-    finally:
         server.shutdown()
-        server.server_close()
 
 
 @pytest.mark.slow
@@ -236,37 +190,26 @@ def test_why_a_camera_cannot_lead_is_told_and_another_device_can(tmp_path: Path)
         wait_until(page, f"JSON.stringify(live.hand.pose().p_WH) !== '{json.dumps(before, separators=(',', ':'))}'")
 
 
-def text_at(host: str, path: str, status: int = 200, **headers: str) -> tuple[bytes, str]:
-    """Return what a server answers a path, and its policy."""
-    with contextlib.closing(HTTPConnection(host, timeout=60.0)) as asking:
-        asking.request("GET", path, headers=headers)
-        got = asking.getresponse()
-        assert got.status == status, path
-        return got.read(), got.headers.get("Content-Security-Policy", "")
-
-
 def test_a_webcams_files_are_served_and_nothing_else_of_their_folder(tmp_path: Path):
     folder = write_files(tmp_path / "vision")
-
-    async def act(_page: LivePage, host: str) -> None:
+    files = WebcamFiles.read(folder)
+    assert files.hashes() == {name: hashlib.sha256((folder / name).read_bytes()).hexdigest() for name in FILES}
+    assert len(files.routes()) == len(FILES) + 1  # and what calls them
+    with served(LivePage(files)) as (address, _):
         for path in ("/webcam/package.json", "/webcam/../package.json", "/webcam/"):
-            await asyncio.to_thread(text_at, host, path, 404)
-        await asyncio.to_thread(text_at, host, f"/webcam/{MODEL}", 400, Host="elsewhere.example")
-        assert (await asyncio.to_thread(text_at, host, f"/webcam/{MODEL}"))[0] == (folder / MODEL).read_bytes()
-        policy = (await asyncio.to_thread(text_at, host, "/webcam/worker.js"))[1]
+            assert answered(address, path)[0].status == 404
+        assert answered(address, f"/webcam/{MODEL}", Host="elsewhere.example")[0].status == 400
+        assert answered(address, f"/webcam/{MODEL}")[1] == (folder / MODEL).read_bytes()
+        policy = answered(address, "/webcam/worker.js")[0].headers["Content-Security-Policy"]
         assert policy == "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; connect-src 'self'"
-        page = unescape((await asyncio.to_thread(text_at, host, "/"))[0].decode())
+        page = unescape(answered(address, "/")[1].decode())
         assert "worker-src 'self'" in page
         assert "wasm-unsafe-eval" not in page.partition("<title>")[0]
 
-    with_page(LivePage(WebcamFiles.read(folder)), act)
-
 
 def test_without_its_files_no_webcam_is_offered():
-    async def act(page: LivePage, host: str) -> None:
-        await asyncio.to_thread(text_at, host, "/webcam/worker.js", 404)
-        assert 'value="tracker"' in page.html()
-        for word in ('value="webcam"', "const handCamera", "worker-src", "wasm-unsafe-eval"):
-            assert word not in page.html()
-
-    with_page(LivePage(), act)
+    with served(page := LivePage()) as (address, _):
+        assert answered(address, "/webcam/worker.js")[0].status == 404
+    assert 'value="tracker"' in page.html()
+    for word in ('value="webcam"', "const handCamera", "worker-src", "wasm-unsafe-eval"):
+        assert word not in page.html()
