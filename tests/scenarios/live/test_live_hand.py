@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from playwright.sync_api import Browser, Locator, Page
+from playwright.sync_api import Browser, Page
 from support.live_pages import LIVE, frames_come, live_run, shown
 from support.opened_page import wait_until
 from support.wording import Wording
@@ -39,13 +39,6 @@ PAD = """
 SIDE_PICTURES = "document.querySelector('.replay-inset').dataset.pictures > 2"
 
 
-def edges(part: Locator) -> tuple[float, float]:
-    """Return how far from the window's top a part begins and ends, pixels."""
-    box = part.bounding_box()
-    assert box is not None
-    return box["y"], box["y"] + box["height"]
-
-
 def wanted(page: Page) -> list[float]:
     return page.evaluate("live.hand.pose().p_WH")
 
@@ -63,23 +56,15 @@ def test_the_page_shows_the_hand_that_a_mouse_or_gamepad_leads_and_its_record_is
         assert "close your hand on the object" in page.locator("#task").inner_text()
         assert page.evaluate(SEEN_SHARE, "hand") > 0.9, "it is seen from behind at first"
         assert abs(page.evaluate("live.scene.spherical().azimuth")) > 0.9 * np.pi  # the robot comes from +x
-        side, first = page.locator(".replay-inset"), page.locator(".replay-scene")
+        side = page.locator(".replay-inset")
         wait_until(page, SIDE_PICTURES)
-        assert edges(side)[1] <= edges(first)[1], "depth is seen beside the first view"
-
-        page.set_viewport_size({"width": 390, "height": 844})
-        assert edges(first)[1] <= edges(side)[0], "and on a phone below it"
-        assert edges(side)[1] <= 844.0
-        page.locator("[data-view=start]").click()
-        assert page.evaluate(SEEN_SHARE, "hand") > 0.9
         page.get_by_label("view from the side").uncheck()
         assert side.count() == 0
         page.get_by_label("view from the side").check()
         wait_until(page, SIDE_PICTURES)
-
         page.set_viewport_size({"width": 640, "height": 480})
         page.locator("[data-view=top]").click()
-        first.scroll_into_view_if_needed()
+        page.locator(".replay-scene").scroll_into_view_if_needed()
         x, y = page.evaluate(f"({PIXEL})(live.hand.pose().p_WH)")
         page.mouse.move(x + 20, y - 10, steps=4)
         wait_until(

@@ -1,5 +1,6 @@
 """The fields that `handover play` offers for parameters: their sliders, which there are, and what is told of faults."""
 
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -7,10 +8,12 @@ from click.testing import CliRunner
 from support.cosim.native_units import native_fmu
 
 from handover.cosim.blocks.variable import Causality, Declared, Kind
+from handover.cosim.python_process import code_command
 from handover.scenarios.cli.command import main
 from handover.scenarios.execution.request import RunRequest
 from handover.scenarios.live.parameter_fields import faults_by_name, field_groups, field_of, without_call
 from handover.scenarios.live.play_page import Session
+from handover.scenarios.live.waiting_command import WaitingCommand
 
 
 @pytest.mark.parametrize(
@@ -24,12 +27,20 @@ def test_a_slider_begins_at_the_declared_minimum_or_at_0_for_what_is_positive(
     assert [slider[0] for slider in field_of(declared, default).sliders] == lowest
 
 
-def test_a_parameter_of_an_algorithm_that_no_session_runs_by_is_shown_only_where_it_is_given():
-    for given in ((), ("parallel_step=0.004",)):
-        groups = field_groups(RunRequest(subject="flyer_impedance", parameters=given))
-        names = [field.name for group in groups for field in group.fields]
-        assert ("parallel_step" in names) == bool(given)
-        assert "force" in names
+def fields_of(subject: str, *given: str) -> list[str]:
+    return [f.name for group in field_groups(RunRequest(subject=subject, parameters=given)) for f in group.fields]
+
+
+def test_a_scenarios_fields_are_its_parameters_without_that_of_an_algorithm_and_an_ssps_those_of_its_units(
+    tmp_path: Path,
+):
+    assert {"force", "thrusters.flapper_range"} <= {*fields_of("flyer_impedance")}
+    assert "parallel_step" not in fields_of("flyer_impedance")
+    assert "parallel_step" in fields_of("flyer_impedance", "parallel_step=0.004")
+    file = str(tmp_path / "x.ssp")
+    done = CliRunner().invoke(main, ["export", "flyer_impedance", "--ssp", file])
+    assert done.exit_code == 0, done.output
+    assert {"push.force", "thrusters.flapper_range"} <= {*fields_of(file)}
 
 
 def test_a_session_of_an_fmu_has_fields_of_its_inputs_and_gives_a_file_of_them_to_all_runs(
@@ -57,3 +68,14 @@ def test_a_session_of_an_fmu_has_fields_of_its_inputs_and_gives_a_file_of_them_t
 def test_a_fault_is_told_without_the_call_that_refused_it():
     assert without_call("p: out (fmi3GetFloat64 answered Error); set by the scenario") == "p: out; set by the scenario"
     assert without_call("x (of fmi3GetFloat64) is wrong") == "x (of fmi3GetFloat64) is wrong"
+
+
+def test_a_command_waits_where_pandas_is_not_installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    (tmp_path / "pandas.py").write_text("raise ModuleNotFoundError('not installed', name='pandas')\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    assert subprocess.run(code_command("import pandas"), capture_output=True, check=False).returncode == 1
+    waiting = WaitingCommand("ir_grasp")
+    waiting.call(["list", "--help"])
+    assert waiting.process.wait(60.0) == 0, waiting.last_error
+    waiting.close()
+    assert not waiting.folder.exists()

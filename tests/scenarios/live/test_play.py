@@ -1,6 +1,5 @@
 """`handover play`: a change begins a run anew, verdicts stand side by side, each run is that of its command."""
 
-import importlib
 import json
 import signal
 from collections.abc import Generator
@@ -13,51 +12,16 @@ import pytest
 from click.testing import CliRunner
 from playwright.sync_api import Browser, Page
 from support.commands import Command, run_command
-from support.cosim.native_units import native_fmu
 from support.kept_runs import kept_run
 from support.live_pages import LIVE, connected, frame, frames_come, page_command, send, shown, time_passes, told
 from support.opened_page import overflow, wait_until
 from support.processes import until
+from support.scenarios.tutorial import SCENE, write_files
 from support.served_live_page import answered
 from support.wording import Wording
 
-from handover.cosim.fmu.file.archive import FmuArchive, write_archive
 from handover.cosim.record.reader import Record
 from handover.scenarios.cli.command import main
-
-OWN = '''
-from dataclasses import dataclass
-from fractions import Fraction
-
-from handover.cosim.blocks.ports import parameter
-from handover.cosim.blocks.units import Second
-from handover.cosim.system.system import System
-from handover.scenarios.execution.file_experiment import UntilStop
-from handover.scenarios.experiment.experiment import Experiment
-
-
-@dataclass(frozen=True, kw_only=True)
-class Parameters:
-    long: Second = parameter(2.0, "how long it lasts", minimum=0.5, maximum=10.0)
-
-
-class Pushing(Experiment[UntilStop]):
-    """a push into the void"""
-
-    parameters_type = Parameters
-    units = {"push": "Push"}
-
-    def build(self, parameters, seed, fmu):
-        s = System()
-        s.add("push", fmu("push"))
-        return s
-
-    def stop_time(self, parameters):
-        return Fraction(parameters.long)
-
-    def evaluator(self, parameters):
-        return UntilStop(self.stop_time(parameters))
-'''
 
 
 @contextmanager
@@ -121,7 +85,7 @@ def test_a_slider_begins_a_run_anew_and_a_run_is_that_of_its_command_is_shown_ag
             page.get_by_role("button", name="write a report").first.click()
             page.get_by_role("link", name="open the report").wait_for()
             assert overflow(page) <= 0
-            assert answered(address, "/report/3")[1].startswith(b"<!DOCTYPE html>")
+            assert answered(address, "/report/3")[1].startswith(b"<!doctype html>")
             assert answered(address, "/report/2")[0].status == 404
         session.send_signal(signal.SIGINT)
         done = session.wait()
@@ -136,7 +100,7 @@ def refusals_are_told_beside_their_fields(page: Page) -> None:
     page.locator("#field-force").fill("60")
     fault = page.locator("[data-name=force] .fault")
     fault.wait_for()
-    assert fault.inner_text() == "force: 60.0 is out of range: from -50.0 to 50 N"
+    assert fault.inner_text() == "force: 60.0 is out of range: from -50 to 50 N"
     assert page.locator("#fault").inner_text() == "No run was begun: see force"
     for seed, why in (
         ("-1", "-1 is out of range: a whole number from 0 to 9007199254740991"),
@@ -157,24 +121,26 @@ def refusals_are_told_beside_their_fields(page: Page) -> None:
 
 
 @pytest.mark.slow
-def test_an_ssp_and_an_own_scenario_are_played_with(tmp_path: Path):
-    done = CliRunner().invoke(main, ["export", "flyer_impedance", "--ssp", str(tmp_path / "x.ssp")])
-    assert done.exit_code == 0, done.output
-    (tmp_path / "pushing.py").write_text(OWN)
-    for subject, field, value in (("x.ssp", "push.force", "8"), ("pushing:Pushing", "long", "1")):
-        out = tmp_path / f"runs_of_{field}"
-        more = ("--stop", "2") if subject == "x.ssp" else ()
-        session = played(subject, out, *more, "--pace", "50", folder=tmp_path)
-        with session as (address, _), connected(address) as page:
-            fields = [f["name"] for group in told(page, "fields")["groups"] for f in group["fields"]]
-            assert field in fields
-            told(page, "ended")
-            send(page, "set", {"parameters": {field: value}})
+def test_an_own_scenario_is_played_with(tmp_path: Path):
+    write_files(tmp_path)
+    with (
+        played(SCENE, tmp_path / "runs", "--pace", "50", folder=tmp_path) as (address, _),
+        connected(address) as page,
+    ):
+        assert "goal" in [f["name"] for group in told(page, "fields")["groups"] for f in group["fields"]]
+        told(page, "ended")
+        send(page, "set", {"parameters": {"goal": "0.4,0.3"}})
+        rows = told(page, "runs")["rows"]
+        while [row["state"] for row in rows].count("succeeded") < 2:
             rows = told(page, "runs")["rows"]
-            while [row["state"] for row in rows].count("succeeded") < 2:
-                rows = told(page, "runs")["rows"]
-            assert sorted((row["number"], row["parameters"]) for row in rows) == [(1, {}), (2, {field: value})]
-        assert json.loads((out / "002" / "summary.json").read_text(encoding="utf-8"))["success"]
+        assert sorted((row["number"], row["parameters"]) for row in rows) == [(1, {}), (2, {"goal": "0.4,0.3"})]
+        for number in (1, 2, 1):  # at once
+            send(page, "show", number)
+        while told(page, "runs")["seen"] != 1:
+            pass
+        send(page, "set", {"parameters": {"patience": "-1"}})
+        assert "patience" in told(page, "choice")["faults"]
+    assert json.loads((tmp_path / "runs/002/summary.json").read_text(encoding="utf-8"))["success"]
 
 
 @pytest.mark.slow
@@ -204,22 +170,6 @@ def test_a_session_that_cannot_begin_is_refused(
     assert done.exit_code == 2
     wording.check(done.output)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_the_step_that_is_taken_is_said_before_a_session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    made = FmuArchive(fmu := native_fmu("mass", 2))
-    files = {name: made.read(name) for name in made.names if not name.endswith("/")}
-    files["modelDescription.xml"] = files["modelDescription.xml"].replace(b' stepSize="0.01"', b"")
-    assert files["modelDescription.xml"] != made.description(), fmu
-
-    async def served(_: object) -> None:
-        pass
-
-    monkeypatch.setattr(importlib.import_module("handover.scenarios.cli.play"), "_serve", served)
-    file = write_archive(tmp_path / "mass.fmu", files)
-    result = CliRunner().invoke(main, ["play", str(file), "--out", str(tmp_path / "out")])
-    assert result.exit_code == 0, result.output
-    assert "0.002 s is taken, a 500th of its default experiment" in result.stderr
 
 
 @pytest.mark.slow

@@ -23,14 +23,11 @@ def test_what_no_unit_took_is_the_masters():
     assert '<td colspan="5">master, recording and other</td><td class="number">3 s</td>' in html
 
 
-def test_small_shares_have_a_digit_more_and_shares_are_never_above_the_whole():
+def test_small_shares_have_a_digit_more_and_the_cheapest_of_many_units_share_a_bar_but_not_a_row():
     html = html_of([unit("a", 9.99), unit("b", 0.05, 0)], 10.0)
     assert '<td class="number">0.5 %</td>' in html
     assert '<td class="number">–</td>' in html
-    assert "other 0 s, 0.0 %" in html
-
-
-def test_the_cheapest_of_many_units_share_a_bar_but_not_a_row():
+    assert "other 0 s, 0.0 %" in html, "shares are never above the whole"
     html = html_of([unit(f"u{i}", 1.0 + i) for i in range(30)], 600.0)
     assert "6 other units" in html
     assert html.count("M (FMI 3)") == 30

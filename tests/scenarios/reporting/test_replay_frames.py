@@ -7,7 +7,6 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
 from handover.scenarios.ir_grasp.parameters import Parameters
@@ -22,10 +21,9 @@ def test_moments_lie_evenly_in_time_where_rows_do_not():
     assert np.diff(time[rows]).max() == pytest.approx(100.0 / (MAX_FRAMES - 1), rel=0.1)
 
 
-@pytest.mark.parametrize("n", [1, 2, 3, 100])
-def test_a_short_record_is_shown_whole(n: int):
-    time: Floats = np.linspace(0.0, 0.5, n)
-    np.testing.assert_array_equal(frame_rows(time), np.arange(n))
+def test_a_short_record_is_shown_whole():
+    for n in (1, 2, 3, 100):
+        np.testing.assert_array_equal(frame_rows(np.linspace(0.0, 0.5, n)), np.arange(n))
 
 
 def test_phases_are_reported_when_they_begin(tmp_path: Path):

@@ -64,11 +64,8 @@ def test_a_body_is_held_once_and_its_place_at_some_moments(record: Record):
     p = numbers(trace["parts"][0]["p"]).reshape(-1, 3)
     assert len(p) < 300 < ROWS
     np.testing.assert_allclose([p[0], p[-1]], MOVING[[0, -1]])
-
-
-def test_what_stays_is_held_once(record: Record):
     (trace,) = data(Replay(bodies=[replace(CUBE, p_WB=np.ones((ROWS, 3)))]), record)["traces"]
-    assert len(numbers(trace["parts"][0]["p"])) == 3
+    assert len(numbers(trace["parts"][0]["p"])) == 3, "what stays is held once"
 
 
 def test_orientations_follow_each_other_the_short_way(record: Record):
@@ -93,20 +90,16 @@ def test_a_body_with_more_or_fewer_rows_than_the_record_is_refused(record: Recor
         replay_section(Replay(bodies=[replace(CUBE, p_WB=MOVING[1:])]), record)
 
 
-def test_names_are_text(record: Record):
-    html = replay_section(Replay(bodies=[CUBE], notes=["a < b"]), record).html
-    assert "<cube>" not in html
-    assert "&lt;cube&gt;" in html
-    assert "a &lt; b" in html
-
-
-def test_a_legends_chip_has_all_colours_of_what_it_names(record: Record):
+def test_a_legends_chip_has_all_colours_of_what_it_names_and_names_are_text(record: Record):
     tube = Line(label="<cube>", colour="#abcdef", points=MOVING[:, None] + [[0, 0, 0], [0, 3, 0]], radii=np.ones(2))
     alone = replace(CUBE, label="alone", colour="#fedcba")
     glass = replace(CUBE, label="glass", opacity=0.5)
-    html = replay_section(Replay(bodies=[CUBE, CUBE, alone, glass], lines=[tube]), record).html
+    html = replay_section(Replay(bodies=[CUBE, CUBE, alone, glass], lines=[tube], notes=["a < b"]), record).html
     chips = re.findall(r'<i style="background: (.*?)">', html)
     assert chips == ["linear-gradient(90deg, #123456 0% 50%, #abcdef 50% 100%)", "#fedcba", "#12345680"]
+    assert "<cube>" not in html
+    assert "&lt;cube&gt;" in html
+    assert "a &lt; b" in html
 
 
 def test_views_hold_what_is_drawn_or_the_window_and_no_more(record: Record):

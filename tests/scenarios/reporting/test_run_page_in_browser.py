@@ -1,14 +1,12 @@
 """The replay of a run's page in a browser: the slider moves what was recorded, play goes on, a video is saved."""
 
 from collections.abc import Generator
-from io import BytesIO
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from PIL import Image
 from playwright.sync_api import Browser, Page
 from scipy.spatial.transform import Rotation
 from support.opened_page import opened, overflow, wait_until
@@ -18,7 +16,6 @@ from handover.cosim.record.reader import Record
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
 from handover.scenarios.ir_grasp.parameters import Parameters
 from handover.scenarios.ir_grasp.plots import phases_of_grasp
-from handover.scenarios.reporting.page import asset
 from handover.scenarios.reporting.replay_section import frame_rows, phase_changes
 
 SCENE = "document.querySelector('.replay-scene')"
@@ -32,6 +29,7 @@ RINGS, SIDES = 3, 16
 def page(browser: Browser, grasp: Path) -> Generator[Page, None, None]:
     with opened(browser, grasp / "report.html") as page:
         wait_until(page, f"{SCENE}.dataset.frame === '0'")
+        page.get_by_label("speed").select_option("0.5")
         yield page
 
 
@@ -43,31 +41,11 @@ def record(grasp: Path) -> Record:
 TEXT_COLOURS = "[...document.querySelectorAll('.plot .xtitle')].map(t => getComputedStyle(t).fill)"
 
 
-def drawn(page: Page) -> list[str]:
-    """Return the names of the curves in the explorer's plot."""
-    return page.evaluate("document.querySelector('.explorer .plot').data.map(trace => trace.name)")
-
-
 LOOKS = """(() => {
     const style = getComputedStyle(document.documentElement), names = [0, 1, 2, 3].map(k => `--c${k}`);
     const named = new Map(names.map(name => [style.getPropertyValue(name).trim(), `var(${name})`]));
     return document.querySelector('.explorer .plot').data.map(t => [named.get(t.line.color), t.line.dash]);
 })()"""
-
-
-def looks(page: Page) -> list[list[str]]:
-    """Return colour and stroke of the curves in the explorer's plot."""
-    return page.evaluate(LOOKS)
-
-
-def test_each_phase_is_named_on_the_page_as_in_the_figure(page: Page, record: Record):
-    phases = phases_of_grasp(record)
-    names = page.evaluate("document.querySelector('#time .plot').layout.annotations.map(a => [a.text, a.textangle])")
-    level, upright = ([name for name, angle in names if bool(angle) is turned] for turned in (False, True))
-    assert {p.name for p in phases} == {*level, *upright}
-    assert len(set(upright)) == len(upright)
-    assert not set(upright) & set(level)
-    assert len(names) < len(phases)
 
 
 def move(page: Page, frame: int) -> None:
@@ -80,46 +58,31 @@ def points(page: Page, name: str) -> Floats:
     return np.array(page.evaluate("name => replays[0].scene.points(name)", name), dtype=np.float64)
 
 
-def test_the_slider_moves_the_hand_to_where_it_was(page: Page, record: Record):
-    rows = frame_rows(record.time)
-    palm = next(b for b in IrGrasp().replay(Parameters(), record).bodies if b.label == "palm")
+def test_the_slider_moves_the_hand_and_bends_a_finger_as_it_was(page: Page, record: Record):
+    rows, replay, phases = frame_rows(record.time), IrGrasp().replay(Parameters(), record), phases_of_grasp(record)
+    palm = next(b for b in replay.bodies if b.label == "palm")
+    thumb = next(line for line in replay.lines if line.label == "thumb")
     assert palm.q_WB is not None
+    assert thumb.radii is not None
     before = points(page, "palm")
     for frame in (len(rows) // 2, len(rows) - 1):
         move(page, frame)
         row = rows[frame]
         turned = Rotation.from_quat(palm.q_WB[row], scalar_first=True).apply(palm.mesh.vertices)
         np.testing.assert_allclose(points(page, "palm"), palm.p_WB[row] + turned, atol=EXACT)
-        value = page.locator(".replay-told").inner_text()
-        phase = [name for begin, name in phase_changes(record, phases_of_grasp(record)) if begin <= record.time[row]][
-            -1
-        ]
-        assert value == f"{record.time[row]:.1f} s, {phase}"
+        rings = points(page, "thumb").reshape(-1, SIDES, 3)[RINGS:-RINGS]
+        np.testing.assert_allclose(rings.mean(axis=1), thumb.points[row], atol=EXACT)
+        reach = np.linalg.norm(rings - rings.mean(axis=1, keepdims=True), axis=2)
+        np.testing.assert_allclose(reach, np.broadcast_to(thumb.radii[:, None], reach.shape), atol=EXACT)
+        phase = [name for begin, name in phase_changes(record, phases) if begin <= record.time[row]][-1]
+        assert page.locator(".replay-told").inner_text() == f"{record.time[row]:.1f} s, {phase}"
     assert np.abs(points(page, "palm") - before).max() > 0.02
-
-
-def test_the_slider_bends_a_finger_as_it_was(page: Page, record: Record):
-    rows = frame_rows(record.time)
-    thumb = next(line for line in IrGrasp().replay(Parameters(), record).lines if line.label == "thumb")
-    move(page, len(rows) - 2)
-    rings = points(page, "thumb").reshape(-1, SIDES, 3)[RINGS:-RINGS]
-    np.testing.assert_allclose(rings.mean(axis=1), thumb.points[rows[-2]], atol=EXACT)
-    assert thumb.radii is not None
-    reach = np.linalg.norm(rings - rings.mean(axis=1, keepdims=True), axis=2)
-    np.testing.assert_allclose(reach, np.broadcast_to(thumb.radii[:, None], reach.shape), atol=EXACT)
-
-
-def test_keys_move_the_slider(page: Page):
-    move(page, 10)
-    page.locator(".replay-time").press("ArrowRight")
-    wait_until(page, f"{SCENE}.dataset.frame === '11'")
 
 
 def test_play_goes_on_until_it_is_paused_and_leaves_the_view_as_it_is(page: Page):
     move(page, 0)
     page.get_by_role("button", name="side").click()
     before = view(page)
-    page.get_by_label("speed").select_option("0.5")
     page.get_by_label("play", exact=True).click()
     wait_until(page, f"{SCENE}.dataset.frame > 2")
     page.get_by_label("pause").click()
@@ -135,22 +98,22 @@ def view(page: Page) -> dict[str, float]:
 
 @pytest.mark.parametrize(
     ("name", "azimuth", "elevation"),
-    [("front", -np.pi / 2.0, np.arctan(0.12)), ("side", np.pi, np.arctan(0.12)), ("top", -np.pi / 2.0, np.pi / 2.0)],
+    [
+        ("start", np.arctan2(-0.7, -0.35), None),
+        ("front", -np.pi / 2.0, np.arctan(0.12)),
+        ("side", np.pi, np.arctan(0.12)),
+        ("top", -np.pi / 2.0, np.pi / 2.0),
+    ],
 )
-def test_a_view_looks_from_where_it_is_named_after(page: Page, name: str, azimuth: float, elevation: float):
-    page.get_by_role("button", name=name).click()
-    seen = view(page)
-    assert np.angle(np.exp(1j * (seen["azimuth"] - azimuth))) == pytest.approx(0.0, abs=1e-6)
-    assert seen["elevation"] == pytest.approx(elevation, abs=2e-3)
-    page.get_by_role("button", name="start").click()
-    assert view(page)["azimuth"] == pytest.approx(np.arctan2(-0.7, -0.35))
-
-
-@pytest.mark.parametrize("name", ["start", "front", "side", "top"])
-def test_a_view_just_holds_what_is_drawn_at_any_time(page: Page, record: Record, name: str):
+def test_a_view_looks_from_where_it_is_named_after_and_just_holds_what_is_drawn_at_any_time(
+    page: Page, record: Record, name: str, azimuth: float, elevation: float | None
+):
     shown = IrGrasp().replay(Parameters(), record)
     labels = {drawn.label for drawn in (*shown.bodies, *shown.lines)}
     page.get_by_role("button", name=name).click()
+    seen_from = view(page)
+    assert np.angle(np.exp(1j * (seen_from["azimuth"] - azimuth))) == pytest.approx(0.0, abs=1e-6)
+    assert elevation is None or seen_from["elevation"] == pytest.approx(elevation, abs=2e-3)
     seen: list[list[float]] = []
     for frame in range(0, len(frame_rows(record.time)), 20):
         move(page, frame)
@@ -162,31 +125,6 @@ def test_a_view_just_holds_what_is_drawn_at_any_time(page: Page, record: Record,
     assert low.min() >= 0.0
     assert high.max() <= 1.0
     assert (high - low).max() > 0.85
-
-
-def test_what_is_drawn_as_dots_is_as_large_on_a_screen_of_small_pixels(browser: Browser):
-    shares: list[float] = []
-    for pixels in (1.0, 2.0):
-        page = browser.new_page(viewport={"width": 400, "height": 300}, device_scale_factor=pixels)
-        page.set_content(
-            "<div id='at' style='width: 200px; height: 200px; background: #fff'></div>"
-            "<style>#at canvas { display: block; width: 100%; height: 100% }</style>"
-        )
-        for script in ("scene/three.min.js", "scene/replay_shapes.js", "scene/scene_objects.js", "scene/scene.js"):
-            page.add_script_tag(content=asset(script))
-        page.evaluate(
-            """() => {
-                const trace = {label: "dot", colour: "#000000", opacity: 1, width: 20, n: 1, points: [0, 0, 0]};
-                window.scene = createScene(document.getElementById("at"),
-                  {traces: [trace], low: [-1, -1, -1], high: [1, 1, 1], eye: [1, 1, 1], floor: -5});
-            }"""
-        )
-        wait_until(page, "document.getElementById('at').dataset.pictures > 0")
-        seen = np.asarray(Image.open(BytesIO(page.locator("#at").screenshot())).convert("L"))
-        shares.append(float(np.mean(seen < 60)))
-        page.close()
-    assert shares[0] > 0.005
-    assert shares[1] == pytest.approx(shares[0], rel=0.15)
 
 
 def test_the_view_follows_the_palm_and_keeps_its_distance(page: Page):
@@ -225,65 +163,35 @@ def test_plots_and_replay_share_a_cursor(page: Page, record: Record):
     assert at == pytest.approx(shown, abs=1e-3)
 
 
-def turn(page: Page, width: int) -> float:
-    """Draw the mouse to the right over the scene and return the angle that it turns by (rad)."""
+@pytest.mark.parametrize("playing", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_a_scene_is_turned_by_all_of_the_mouses_way_and_stays_turned_while_it_plays(page: Page, playing: bool):
+    page.get_by_role("button", name="start").click()
     page.locator(".replay-scene").scroll_into_view_if_needed()
+    if playing:
+        move(page, 0)
+        page.get_by_label("play", exact=True).click()
+    before = view(page)["azimuth"]
     box = page.locator(".replay-scene").bounding_box()
     assert box is not None
-    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    x, y, way = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2, 80
     page.mouse.move(x, y)
     page.mouse.down()
-    page.mouse.move(x + width, y, steps=8)
+    page.mouse.move(x + way, y, steps=8)
     page.mouse.up()
-    return 2.0 * np.pi * width / box["height"]
-
-
-def test_a_scene_is_turned_by_all_of_the_mouses_way(page: Page):
-    page.get_by_role("button", name="start").click()
-    before = view(page)["azimuth"]
-    turned = turn(page, 80)
+    if playing:
+        wait_until(page, f"{SCENE}.dataset.frame > 0")
+        if page.get_by_label("pause").count():  # else it has come to its end
+            page.get_by_label("pause").click()
+    turned = 2.0 * np.pi * way / box["height"]
     assert np.angle(np.exp(1j * (before - view(page)["azimuth"]))) == pytest.approx(turned, rel=0.05)
 
 
-@pytest.mark.slow
-def test_a_scene_that_is_turned_while_it_plays_stays_turned(page: Page):
-    page.get_by_role("button", name="start").click()
-    move(page, 0)
-    page.get_by_label("speed").select_option("0.5")
-    page.get_by_label("play", exact=True).click()
-    before = view(page)["azimuth"]
-    turned = turn(page, 80)
-    seen = page.evaluate(f"{SCENE}.dataset.frame")
-    wait_until(page, f"{SCENE}.dataset.frame !== '{seen}'")
-    page.get_by_label("pause").click()
-    assert np.angle(np.exp(1j * (before - view(page)["azimuth"]))) == pytest.approx(turned, rel=0.05)
-
-
-@pytest.mark.slow
 def test_a_name_in_the_legend_hides_what_is_called_so(page: Page):
-    shown = "replays[0].scene.visible('beams')"
     name = page.get_by_role("button", name="beams")
-    name.click()
-    wait_until(page, f"({shown}).every(visible => visible === false)")
-    assert name.get_attribute("aria-pressed") == "false"
-    name.click()
-    wait_until(page, f"({shown}).every(visible => visible === true)")
-
-
-def brightness(page: Page) -> float:
-    """Return the mean brightness of the scene as it is seen, from 0 to 255."""
-    seen = Image.open(BytesIO(page.locator(".replay-scene").screenshot())).convert("L")
-    return float(np.mean(np.asarray(seen)))
-
-
-def test_the_scene_follows_the_page_into_the_dark(page: Page):
-    before = view(page)
-    assert brightness(page) > 200.0
-    page.emulate_media(color_scheme="dark")
-    assert brightness(page) < 80.0
-    assert view(page) == before
-    page.emulate_media(color_scheme="light")
-    assert brightness(page) > 200.0
+    for visible in ("false", "true"):
+        name.click()
+        wait_until(page, f"replays[0].scene.visible('beams').every(visible => visible === {visible})")
+        assert name.get_attribute("aria-pressed") == visible
 
 
 def test_the_bar_is_as_long_as_it_says(page: Page):
@@ -340,36 +248,27 @@ def frames(file: Path) -> list[NDArray[np.uint8]]:
 
 
 @pytest.mark.slow
-def test_the_button_saves_the_replay_from_its_beginning_to_its_end(page: Page, record: Record, tmp_path: Path):
-    last = float(record.time[-1])
+def test_a_video_is_saved_from_beginning_to_end_or_until_it_is_ended_and_another_can_begin(
+    page: Page, record: Record, tmp_path: Path
+):
     page.locator(".replay-time").fill("100")
-    page.locator(".replay-speed").select_option("5")
-    with page.expect_download() as saved:
-        page.get_by_role("button", name="record a video").click()
-        assert page.get_by_role("button", name="stop and save").is_visible()
-    assert page.locator(".replay-told").inner_text().startswith(f"{last:.1f} s")
-    assert saved.value.suggested_filename.split(".") in (["ir_grasp", "mp4"], ["ir_grasp", "webm"])
-    file = tmp_path / saved.value.suggested_filename
-    saved.value.save_as(file)
-    shown = frames(file)
-    wide, high = page.evaluate("[replays[0].scene.canvas.width & ~1, replays[0].scene.canvas.height & ~1]")
-    assert {p.shape for p in shown} == {(high, wide, 3)}
-    assert np.abs(shown[-1].astype(float) - shown[0]).max() > 100.0
-    assert shown[0].mean() > 180.0  # it has the page's background
-
-
-@pytest.mark.slow
-def test_a_video_that_is_ended_early_is_saved_and_another_can_begin(page: Page, tmp_path: Path):
-    page.locator(".replay-speed").select_option("0.5")
-    for _ in range(2):
+    for early in (True, False):
+        page.locator(".replay-speed").select_option("0.5" if early else "5")
         with page.expect_download() as saved:
             page.get_by_role("button", name="record a video").click()
-            wait_until(page, "replays[0].element.dataset.frame > 10")
-            page.get_by_role("button", name="stop and save").click()
+            if early:
+                wait_until(page, "replays[0].element.dataset.frame > 10")
+                page.get_by_role("button", name="stop and save").click()
+        assert saved.value.suggested_filename.split(".") in (["ir_grasp", "mp4"], ["ir_grasp", "webm"])
         saved.value.save_as(tmp_path / "video")
-        assert frames(tmp_path / "video")
-        assert float(page.evaluate("replays[0].element.dataset.frame")) < 200
+        shown = frames(tmp_path / "video")
+        wide, high = page.evaluate("[replays[0].scene.canvas.width & ~1, replays[0].scene.canvas.height & ~1]")
+        assert {p.shape for p in shown} == {(high, wide, 3)}
+        assert (float(page.evaluate("replays[0].element.dataset.frame")) < 200) is early
         page.get_by_role("button", name="record a video").wait_for()
+    assert page.locator(".replay-told").inner_text().startswith(f"{float(record.time[-1]):.1f} s")
+    assert np.abs(shown[-1].astype(float) - shown[0]).max() > 100.0
+    assert shown[0].mean() > 180.0  # it has the page's background
 
 
 def test_the_page_is_drawn_follows_its_reader_and_asks_for_nothing(page: Page):
@@ -380,14 +279,16 @@ def test_the_page_is_drawn_follows_its_reader_and_asks_for_nothing(page: Page):
     page.fill(".explorer input", "range")
     page.select_option(".explorer select", ["scene.range"])
     wait_until(page, "document.querySelector('.explorer .plot').data[0].name === 'scene.range[1]'")
-    assert drawn(page) == [f"scene.range[{i}]" for i in (1, 2, 3)]
+    names = page.evaluate("document.querySelector('.explorer .plot').data.map(trace => trace.name)")
+    assert names == [f"scene.range[{i}]" for i in (1, 2, 3)]
     assert page.inner_text(".explorer .about").startswith("scene.range ")
-    assert looks(page) == [["var(--c0)", "solid"], ["var(--c1)", "dash"], ["var(--c2)", "dot"]]
+    assert page.evaluate(LOOKS) == [["var(--c0)", "solid"], ["var(--c1)", "dash"], ["var(--c2)", "dot"]]
     page.fill(".explorer input", "scene.q")
     page.select_option(".explorer select", ["scene.q"])
     wait_until(page, "document.querySelector('.explorer .plot').data[0].name === 'scene.q[1]'")
     strokes, colours = ["solid", "dash", "dot"], [f"var(--c{k})" for k in range(3)]
-    assert looks(page)[:9] == [[colours[k // 3], strokes[k % 3]] for k in range(len(looks(page)))][:9]
+    looks = page.evaluate(LOOKS)
+    assert looks[:9] == [[colour, stroke] for colour in colours for stroke in strokes][: len(looks)]
     light = page.evaluate(TEXT_COLOURS)
     page.emulate_media(color_scheme="dark")
     wait_until(page, f"({TEXT_COLOURS}).every((c, k) => c !== {light}[k])")
