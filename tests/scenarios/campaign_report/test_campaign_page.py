@@ -39,51 +39,32 @@ def replaced(table: CampaignTable, column: str, values: list[Any]) -> CampaignTa
     return CampaignTable(whole.set_column(index, kept, made.cast(kept.type)))
 
 
+def part_of(html: str, anchor: str) -> str:
+    """Return a section of a page."""
+    return html.partition(f'id="{anchor}"')[2].partition("</section>")[0]
+
+
 def test_a_campaign_that_is_not_complete_says_how_far_it_is(tmp_path: Path):
     html = page_of(tmp_path, campaign_metadata("ir_grasp", POINTS, repetitions=30), table_of(POINTS, repetitions=2))
     assert "<b>4 of 60 runs so far</b>; run the same command again to resume." in html
     assert "In 2 of 4 runs done the task succeeded." in html
-
-
-def test_a_campaign_without_a_run_has_a_page(tmp_path: Path):
-    html = page_of(tmp_path, campaign_metadata("ir_grasp", POINTS), CampaignTable(table_of(POINTS).table.slice(0, 0)))
+    none = CampaignTable(table_of(POINTS).table.slice(0, 0))
+    html = page_of(tmp_path / "begun", campaign_metadata("ir_grasp", POINTS), none)
     assert "<b>0 of 4 runs so far</b>" in html
     assert 'id="success"' not in html
     assert 'id="runs"' not in html
 
 
-def test_failures_are_one_if_but_their_numbers_differ(tmp_path: Path):
-    html = page_of(tmp_path, campaign_metadata("ir_grasp", POINTS), table_of(POINTS))
-    part = html[html.index('id="failures"') : html.index('id="runs"')]
+def test_failures_are_one_if_but_their_numbers_or_signs_differ_and_what_runs_tell_is_no_html(tmp_path: Path):
+    plan = campaign_metadata("ir_grasp", POINTS)
+    part = part_of(page_of(tmp_path / "numbers", plan, table_of(POINTS)), "failures")
     assert part.count("slipped at") == part.count("slipped at 0.1 s") == 1
     assert "000_r0001, 001_r0001" in part
     assert "whose reasons differ only in numbers are in one row" in part
-
-
-def test_failures_are_one_if_but_a_numbers_sign_differs(tmp_path: Path):
-    table = replaced(table_of(POINTS), "reason", ["held", "-35 mm beside it", "held", "+22 mm beside it"])
-    html = page_of(tmp_path, campaign_metadata("ir_grasp", POINTS), table)
-    part = html[html.index('id="failures"') : html.index('id="runs"')]
-    assert part.count("mm beside it") == part.count("-35 mm beside it") == 1
-
-
-def test_what_runs_tell_is_no_html(tmp_path: Path):
-    table = replaced(table_of(POINTS), "reason", ["</script><script>alert(1)</script>"] * 4)
-    assert "<script>alert" not in page_of(tmp_path, campaign_metadata("ir_grasp", POINTS), table)
-
-
-def test_metrics_that_are_not_numbers_leave_gaps(tmp_path: Path):
-    table = table_of(POINTS, moved=[math.nan, 0.1, math.inf, None])
-    assert (
-        "NaN"
-        not in page_of(tmp_path, campaign_metadata("ir_grasp", POINTS), table).split("</nav>")[1].split("</main>")[0]
-    )
-
-
-def test_a_units_parameter_that_is_fixed_to_a_name_is_shown_by_it(tmp_path: Path):
-    plan = campaign_metadata("ir_grasp", POINTS) | {"fixed": {"scene.material": "soft", "scene.mass": "0.1"}}
-    html = page_of(tmp_path, plan, table_of(POINTS))
-    assert "soft" in html[html.index("Fixed parameters") :]
+    reasons = ["held", "-35 mm beside it", "<script>alert(1)", "+22 mm beside it"]
+    html = page_of(tmp_path / "signs", plan, replaced(table_of(POINTS), "reason", reasons))
+    assert part_of(html, "failures").count("mm beside it") == part_of(html, "failures").count("-35 mm beside it") == 1
+    assert "<script>alert" not in html
 
 
 def test_a_parameter_that_some_points_leave_alone_is_reported_as_a_gap(tmp_path: Path):
@@ -109,20 +90,19 @@ def test_more_points_than_a_list_has_room_for_are_in_the_table_alone(tmp_path: P
     assert (f"{n} points are too many for plots" in html) == (n > 200)
 
 
-@pytest.mark.parametrize("n", [1, 2])
-def test_a_point_of_one_run_has_no_interval_in_the_plot(tmp_path: Path, n: int):
-    html = page_of(tmp_path, campaign_metadata("ir_grasp", POINTS, repetitions=n), table_of(POINTS, repetitions=n))
-    part = html[html.index('id="success"') : html.index('id="runs"')]
-    assert ("one at each point." in part) is (n == 1)
-    assert ("bars: 95 % intervals" in part) is (n > 1)
-    assert ('"array":[null,null]' in part) is (n == 1)
+def test_a_point_of_one_run_has_no_interval_in_the_plot(tmp_path: Path):
+    for n in (1, 2):
+        html = page_of(tmp_path / str(n), campaign_metadata("ir_grasp", POINTS, n), table_of(POINTS, n))
+        part = part_of(html, "success")
+        assert ("one at each point." in part) is (n == 1)
+        assert ("bars: 95 % intervals" in part) is (n > 1)
+        assert ('"array":[null,null]' in part) is (n == 1)
 
 
 def test_points_of_a_paired_campaign_are_compared(tmp_path: Path):
     table = replaced(table_of(POINTS, repetitions=6), "success", [True] * 6 + [False] * 6)
     html = page_of(tmp_path, campaign_metadata("ir_grasp", POINTS, repetitions=6, paired=True), table)
-    part = html[html.index('id="pairs"') : html.index('id="failures"')]
-    assert "<td class=\"number\" data-key='0.03125'>0.0312</td>" in part
+    assert "<td class=\"number\" data-key='0.03125'>0.0312</td>" in part_of(html, "pairs")
 
 
 def test_claims_stand_with_their_verdicts(tmp_path: Path):
@@ -141,8 +121,8 @@ def test_claims_stand_with_their_verdicts(tmp_path: Path):
 
 def test_a_papers_campaign_of_another_version_says_what_is_left_out(tmp_path: Path):
     html = page_of(tmp_path, campaign_metadata("helix_handover", POINTS, experiment="helix-1"), table_of(POINTS))
-    part = html[html.index('id="comparison"') : html.index('id="success"')]
-    assert "The campaign is of another version of helix-1, so this is left out: its runs have no tuning." in part
+    told = "The campaign is of another version of helix-1, so this is left out: its runs have no tuning."
+    assert told in part_of(html, "comparison")
 
 
 @pytest.mark.parametrize(
@@ -165,58 +145,48 @@ def test_of_a_damaged_folder_nothing_is_written(tmp_path: Path, file: str, conte
 
 
 @pytest.mark.parametrize(
-    ("column", "values", "fault"),
+    ("column", "values"),
     [
-        ("seed", ["x"] * 4, "'seed' does not hold whole numbers"),
-        ("seed", [None] * 4, "'seed' does not hold whole numbers"),
-        ("reason", [[1]] * 4, "'reason' does not hold texts"),
-        ("final_distance_thumb", [1, None, 2, 3], "'final_distance_thumb' does not hold numbers"),
-        ("final_distance_thumb", ["x"] * 4, "'final_distance_thumb' does not hold numbers"),
-        ("run", ["y" * 10_000] * 4, "is no run's name"),
+        ("seed", ["x"] * 4),
+        ("seed", [None] * 4),
+        ("reason", [[1]] * 4),
+        ("final_distance_thumb", ["x"] * 4),
+        ("run", ["y" * 10_000] * 4),
     ],
 )
-def test_columns_of_other_types_are_refused(tmp_path: Path, column: str, values: list[Any], fault: str):
+def test_columns_of_other_types_are_refused(tmp_path: Path, column: str, values: list[Any]):
     table = replaced(table_of(POINTS, final_distance_thumb=[0.04] * 4), column, values)
     folder = folder_of(tmp_path, campaign_metadata("ir_grasp", POINTS), table)
-    with pytest.raises(InvalidRunFolder, match=fault):
+    with pytest.raises(InvalidRunFolder):
         write_campaign_page(folder)
     assert not folder.report.exists()
 
 
-def test_a_value_that_is_no_number_is_shown_as_it_is(tmp_path: Path):
+def test_numbers_of_a_column_have_one_precision_and_what_is_no_number_leaves_a_gap_or_is_shown_as_it_is(tmp_path: Path):
     points = [{"forward": "<b>far</b>"}, {"forward": "0.03"}]
-    assert "&lt;b&gt;far" in page_of(tmp_path, campaign_metadata("ir_grasp", points), table_of(points))
-
-
-def test_numbers_of_a_column_have_one_precision(tmp_path: Path):
-    table = table_of(POINTS, final_distance_thumb=[0.04068, 0.04068, 0.00005991, 0.00005991])
-    page = page_of(tmp_path, campaign_metadata("ir_grasp", POINTS), table)
+    plan = campaign_metadata("ir_grasp", points) | {"fixed": {"scene.material": "soft"}}
+    distances = [0.04068, 0.04068, 0.00005991, 0.00005991]
+    table = table_of(points, final_distance_thumb=distances, moved=[math.nan, 0.1, math.inf, None])
+    page = page_of(tmp_path, plan, table)
     for anchor in ("points", "runs"):
-        part = page.partition(f'id="{anchor}"')[2].partition("</section>")[0]
+        part = part_of(page, anchor)
         assert ">40.680<" in part
         assert ">0.060<" in part
         assert "0.05991" not in part.replace("data-key='5.991e-05'", "")
+    assert "NaN" not in page.split("</nav>")[1].split("</main>")[0]
+    assert "&lt;b&gt;far" in page
+    assert "soft" in page[page.index("Fixed parameters") :], "a unit's parameter that is fixed to a name"
 
 
-def test_a_median_of_some_of_the_runs_says_of_how_many(tmp_path: Path):
-    table = table_of(POINTS, final_distance_thumb=[0.04, math.nan, 0.06, 0.06])
-    page = page_of(tmp_path, campaign_metadata("ir_grasp", POINTS), table)
-    part = page.partition('id="points"')[2].partition("</section>")[0]
-    assert ">40, of 1<" in part
-    assert ">60<" in part
+def test_a_median_of_some_of_the_runs_says_of_how_many_and_its_interval_has_its_digits(tmp_path: Path):
+    values = [*np.linspace(0.0627, 0.0629, 12).tolist(), *[0.04] * 2, *[math.nan] * 10]
+    plan = campaign_metadata("ir_grasp", POINTS, repetitions=12)
+    part = part_of(page_of(tmp_path, plan, table_of(POINTS, 12, final_distance_thumb=values)), "points")
+    assert ", of 2<" in part
     assert "so many of the runs done have a value" in part
-
-
-def test_the_interval_of_a_median_has_the_medians_digits(tmp_path: Path):
-    values = np.linspace(0.0627, 0.0629, 12).tolist()
-    plan = campaign_metadata("ir_grasp", POINTS, repetitions=6)
-    page = page_of(tmp_path, plan, table_of(POINTS, repetitions=6, final_distance_thumb=values))
-    part = page.partition('id="points"')[2].partition("</section>")[0]
-    shown = re.findall(r">(\d+\.\d+) \((\S+) to (\S+)\)<", part)
-    assert shown
-    for median, low, high in shown:
-        assert float(low) <= float(median) <= float(high)
-        assert len({len(text.partition(".")[2]) for text in (median, low, high)}) == 1
+    ((median, low, high),) = re.findall(r">(\d+\.\d+) \((\S+) to (\S+)\)<", part)
+    assert float(low) <= float(median) <= float(high)
+    assert len({len(text.partition(".")[2]) for text in (median, low, high)}) == 1
 
 
 def test_few_runs_are_points_and_many_have_a_box_too():

@@ -17,10 +17,10 @@ def test_a_number_is_an_axis_with_its_unit():
     assert along.places == pytest.approx([20.0, 55.0, 30.0])
     assert along.room == pytest.approx(8.0)
     assert not along.listed
-
-
-def test_an_angle_is_reported_in_degrees():
     assert layout("ir_grasp", {"turn_most": "0"}, {"turn_most": "3.14159265"}).title == "turn most (°)"
+    places = along.beside(0, 100)
+    assert np.all(np.abs(places - along.places[0]) < along.room / 2)
+    assert len(set(places.tolist())) == 100
 
 
 def test_numbers_that_are_far_apart_and_near_have_a_logarithmic_axis():
@@ -48,29 +48,17 @@ THREE = [
     {"strategy": "blind", "thing": "baby_cup_a", "perturbed": "true"},
 ]
 SOME = [{"strategy": "reflex"}, *({"strategy": "forward", "forward": f} for f in ("0.035", "0.055"))]
+LONG = [{"thing": f"a_thing_with_a_long_name_{k}"} for k in range(6)]
 
 
-@pytest.mark.parametrize("points", [THREE, SOME], ids=["three parameters", "a parameter of some points only"])
-def test_points_that_differ_in_more_are_a_list_from_top_to_bottom(points: list[dict[str, str]]):
+@pytest.mark.parametrize("points", [THREE, SOME, LONG], ids=["three parameters", "some points only", "long names"])
+def test_points_that_differ_in_more_or_need_room_are_a_list_from_top_to_bottom(points: list[dict[str, str]]):
     along = layout("ir_grasp", *points)
     assert along.listed
     assert np.all(np.diff(along.places) < 0)
     assert len({name for _, name in along.ticks or ()}) == len(points)
 
 
-def test_names_that_need_more_room_than_there_is_are_a_list():
-    along = layout("ir_grasp", *({"thing": f"a_thing_with_a_long_name_{k}"} for k in range(6)))
-    assert along.listed
-
-
 def test_a_parameter_that_goes_with_another_is_not_reported_twice():
     points = [{"alpha": a, "control_period": p} for a, p in (("0.1", "1.38"), ("0.2", "1.51"), ("0.4", "1.45"))]
     assert layout("helix_handover", *points).title == "alpha"
-
-
-@pytest.mark.parametrize("n", [1, 2, 8, 100])
-def test_the_runs_of_a_point_stay_within_its_room(n: int):
-    along = layout("ir_grasp", {"forward": "0.02"}, {"forward": "0.03"})
-    places = along.beside(0, n)
-    assert np.all(np.abs(places - along.places[0]) < along.room / 2)
-    assert len(set(places.tolist())) == n

@@ -174,10 +174,3 @@ def test_parameters_units_and_versions_that_differ_are_listed(tmp_path: Path):
         ("parameter", "k", "2", "3"),
         ("unit", "mass", "mass.fmu (111111111111)", "–"),
     ]
-
-
-def test_runs_of_different_scenarios_are_refused(tmp_path: Path):
-    first = run(tmp_path / "a", [0.0, 1.0], {})
-    second = run(tmp_path / "b", [0.0, 1.0], {}, scenario="pendulum")
-    with pytest.raises(NotComparable, match=f"{second} is of another scenario, pendulum, than {first}, spring"):
-        runs(first, second)
