@@ -30,15 +30,10 @@ def test_a_mesh_encloses_its_volume(mesh: Mesh, wanted: float, short: float):
     assert (1.0 - short) * wanted - 1e-9 <= volume(mesh) <= wanted + 1e-9
 
 
-def test_every_edge_of_a_mesh_is_between_two_triangles():
-    mesh = ball(1.0)
-    edges = [(int(t[k]), int(t[(k + 1) % 3])) for t in mesh.triangles for k in range(3)]
+def test_every_edge_of_a_ball_is_between_two_triangles_and_sides_of_a_prism_share_no_vertices():
+    edges = [(int(t[k]), int(t[(k + 1) % 3])) for t in ball(1.0).triangles for k in range(3)]
     assert Counter(edges) == Counter((b, a) for a, b in edges)
-
-
-def test_sides_of_a_prism_share_no_vertices_so_that_its_edges_look_sharp():
-    mesh = prism(SQUARE, 0.0, 1.0)
-    assert len(mesh.vertices) == 24
+    assert len(prism(SQUARE, 0.0, 1.0).vertices) == 24, "so its edges look sharp"
 
 
 def test_merged_meshes_keep_their_triangles_apart():

@@ -50,7 +50,6 @@ def evaluator(**returned: Any) -> Any:
     ("method", "value", "right", "example"),
     [
         ("time_figures", None, "list or tuple of TimeFigure", "[TimeFigure("),
-        ("time_figures", FIGURE, "list or tuple of TimeFigure", "[TimeFigure("),
         ("time_figures", [PLOT], "list or tuple of TimeFigure", "[TimeFigure("),
         ("time_figures", {"x": FIGURE}, "list or tuple of TimeFigure", "[TimeFigure("),
         ("time_figures", [FIGURE, FIGURE], "each with a name of its own", "[TimeFigure("),
@@ -59,7 +58,6 @@ def evaluator(**returned: Any) -> Any:
         ("published", None, "list or tuple of PublishedValue", "[PublishedValue("),
         ("pushes", None, "list or tuple of Pushable", "[Pushable("),
         ("cycle", "controller", "list or tuple of str", '("controller",)'),
-        ("stop_time", "5", "a number of seconds", "Fraction(5)"),
         ("stop_time", float("inf"), "a number of seconds", "Fraction(5)"),
         ("step_in_parallel", 0.01, "a Fraction", "Fraction(1, 500)"),
         ("build", None, "a System", "System()"),
@@ -78,9 +76,6 @@ def test_a_scenarios_method_names_the_type_that_is_right(method: str, value: Any
     assert example in told.partition(", such as ")[2]
 
 
-METRES = Outcome(success=True, reason="", metrics={"far": Metric(0.5, "metres")})
-
-
 @pytest.mark.parametrize("method", ["build", "replay"])
 def test_a_method_that_takes_other_arguments_is_refused_as_its_class_is_made(method: str):
     def take(self: Any) -> None: ...
@@ -90,27 +85,15 @@ def test_a_method_that_takes_other_arguments_is_refused_as_its_class_is_made(met
     assert f"({Path(__file__).name}, line " in str(raised.value)
 
 
-@pytest.mark.parametrize(
-    ("method", "value"), [("outcome", True), ("outcome", METRES), ("over", None), ("pictures", None)]
-)
-def test_so_does_an_evaluators(method: str, value: Any):
-    judge = evaluator(**{method: value})
-    with pytest.raises(WrongType, match=r"^Wrong\..*; expected .*, such as "):
-        _ = judge.over if method == "over" else getattr(judge, method)()
-
-
-def test_an_evaluator_whose_end_is_a_method_is_refused_before_the_run():
-    class Forgetful(Evaluator):
-        def __call__(self, t: float, signals: Any) -> None: ...
-
-        def over(self) -> bool:  # type: ignore
-            return False
-
-        def outcome(self) -> Outcome:
-            return Outcome(success=True, reason="")
-
+def test_an_evaluators_types_are_checked_too_and_that_its_end_is_no_method_before_the_run():
+    metres = Outcome(success=True, reason="", metrics={"far": Metric(0.5, "metres")})
+    for method, value in (("outcome", True), ("outcome", metres), ("over", None), ("pictures", None)):
+        judge = evaluator(**{method: value})
+        with pytest.raises(WrongType, match=r"^Wrong\..*; expected .*, such as "):
+            _ = judge.over if method == "over" else getattr(judge, method)()
+    called: Any = type("Forgetful", (Evaluator,), dict.fromkeys(("__call__", "over", "outcome"), giving(False)))
     with pytest.raises(WrongType, match=r"^Forgetful.over is a method; expected a property, such as @property"):
-        scenario(evaluator=Forgetful()).bound_evaluator(None)
+        scenario(evaluator=called()).bound_evaluator(None)
 
 
 WRONG = cast(Any, None)
@@ -175,7 +158,7 @@ from handover.cosim.system.system import System
 from handover.scenarios.experiment.experiment import Experiment
 
 
-class {name}(Experiment):
+class Scene(Experiment):
     units = {{"push": "Push"}}
     {attribute}
 
@@ -193,7 +176,7 @@ class {name}(Experiment):
 
 
 def test_a_run_is_refused_in_one_line_before_it_begins(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    (tmp_path / "judged_by_itself.py").write_text(SCENE.format(name="Scene", attribute=""))
+    (tmp_path / "judged_by_itself.py").write_text(SCENE.format(attribute=""))
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
     done = CliRunner().invoke(main, ["run", "judged_by_itself:Scene", "--out", "out"])
@@ -207,7 +190,7 @@ def test_a_run_is_refused_in_one_line_before_it_begins(tmp_path: Path, monkeypat
 @pytest.mark.parametrize("attribute", ['headline = "distance"', 'places = ["push"]', 'unit_files = ("push.model")'])
 def test_a_text_where_names_are_right_is_refused(attribute: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     name = f"wrong_{attribute.split()[0]}"
-    (tmp_path / f"{name}.py").write_text(SCENE.format(name="Scene", attribute=attribute))
+    (tmp_path / f"{name}.py").write_text(SCENE.format(attribute=attribute))
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(InvalidScenario, match=r"its '\w+' is .*; expected .*, such as "):
         named_scenario(f"{name}:Scene")

@@ -1,12 +1,10 @@
 """`handover film`: its frames show the run at their times, as asked for; what cannot be filmed is refused."""
 
+import contextlib
 import math
 import os
 import shutil
 import signal
-import subprocess
-import sys
-import time
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -17,7 +15,9 @@ import pytest
 from click.testing import CliRunner
 from numpy.typing import NDArray
 from PIL import Image
+from support.commands import Command
 from support.kept_runs import copied_run
+from support.processes import family, until
 from support.wording import Wording
 
 from handover.cosim.record.reader import Record
@@ -63,27 +63,16 @@ def cursor(picture: Pixels) -> float:
     return left + float(np.argmin(picture[rows, left:].astype(float).mean(axis=0)))
 
 
-@pytest.fixture(scope="module")
-def mp4(grasp: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    out = tmp_path_factory.mktemp("films") / "grasp.mp4"
-    plot = "cost of thumb and ring, [Luberto] eq. (4)"
+def test_a_films_scene_and_cursor_move_with_the_times_of_its_frames(grasp: Path, tmp_path: Path):
+    out, plot = tmp_path / "grasp.mp4", "cost of thumb and ring, [Luberto] eq. (4)"
     status, told = film(grasp, "--out", out, "--size", f"{WIDE}x{HIGH}", "--pace", 5, "--fps", 4, "--plot", plot)
     assert status == 0, told
     assert f"\nfilm: {out}, " in told
-    assert [p.name for p in out.parent.iterdir()] == ["grasp.mp4"]
-    return out
-
-
-def test_a_film_has_a_frame_for_each_of_its_times_in_its_size(mp4: Path, grasp: Path):
-    time = Record(grasp / "signals.parquet").time
-    shown = frames(mp4)
+    assert [p.name for p in tmp_path.iterdir()] == ["grasp.mp4"]
+    time, shown = Record(grasp / "signals.parquet").time, frames(out)
     assert len(shown) == int((time[-1] - time[0]) / 5 * 4) + 2  # the first, each 1.25 s after it, and the last
     assert {p.shape for p in shown} == {(HIGH, WIDE)}
-    assert cv2.VideoCapture(str(mp4)).get(cv2.CAP_PROP_FPS) == pytest.approx(4.0)
-
-
-def test_the_scene_moves_and_the_cursor_with_the_time(mp4: Path):
-    shown = frames(mp4)
+    assert cv2.VideoCapture(str(out)).get(cv2.CAP_PROP_FPS) == pytest.approx(4.0)
     scene = [p[60:300, 20:350].astype(float) for p in shown]
     assert np.abs(scene[len(scene) // 2] - scene[0]).max() > 60.0
     assert np.abs(scene[-1] - scene[0]).max() > 60.0
@@ -99,10 +88,12 @@ def test_the_scene_moves_and_the_cursor_with_the_time(mp4: Path):
 def test_a_gif_and_a_webm_have_the_same_frames(grasp: Path, tmp_path: Path, suffix: str):
     out = tmp_path / f"film{suffix}"
     status, told = film(
-        grasp, "--out", out, "--size", "320x240", "--no-plots", "--pace", 5, "--fps", 4, "--view", "top"
+        grasp, "--out", out, "--size", "320x240", "--no-plots", "--pace", 10, "--fps", 4, "--view", "top"
     )
     assert status == 0, told
-    expected = len(frame_times(0.0, float(Record(grasp / "signals.parquet").time[-1]), FilmSettings(pace=5.0, fps=4.0)))
+    expected = len(
+        frame_times(0.0, float(Record(grasp / "signals.parquet").time[-1]), FilmSettings(pace=10.0, fps=4.0))
+    )
     if suffix == ".webm":
         assert [p.shape for p in frames(out)] == expected * [(240, 320)]
         return
@@ -129,28 +120,21 @@ def test_a_frame_looks_the_same_whatever_was_shown_before(grasp: Path):
     assert picture.mean() < 80.0  # it is dark
 
 
-def test_a_time_that_goes_back_has_no_frames():
-    with pytest.raises(NotFilmed):
-        frame_times(0.2, 0.1, FilmSettings())
-
-
 def test_the_frames_times_are_even_and_end_with_the_run():
     settings = FilmSettings(pace=2.0, fps=10.0)
     np.testing.assert_allclose(frame_times(1.0, 2.0, settings), [1.0, 1.2, 1.4, 1.6, 1.8, 2.0])
     np.testing.assert_allclose(frame_times(1.0, 1.7, settings), [1.0, 1.2, 1.4, 1.6, 1.7])
     np.testing.assert_allclose(frame_times(0.0, 0.3, FilmSettings(pace=1.0, fps=10.0)), [0.0, 0.1, 0.2, 0.3])
-    for end, pace in ((1e300, 1.0), (1.0, 1e-300), (math.inf, 1.0)):
+    for end, pace in ((1e300, 1.0), (1.0, 1e-300), (math.inf, 1.0), (-0.1, 1.0)):
         with pytest.raises(NotFilmed):
             frame_times(0.0, end, FilmSettings(pace=pace))
 
 
-@pytest.mark.parametrize(
-    ("size", "page", "scale"),
-    [((1280, 720), (1280, 720), 1.0), ((1920, 1080), (1280, 720), 1.5), ((3840, 2160), (1280, 720), 3.0),
-     ((640, 360), (640, 360), 1.0), ((1922, 1082), (1922, 1082), 1.0)],
-)  # fmt: skip
-def test_a_large_film_is_a_page_enlarged(size: tuple[int, int], page: tuple[int, int], scale: float):
-    assert window_of(size) == (page, scale)
+def test_a_large_film_is_a_page_enlarged():
+    assert window_of((1280, 720)) == ((1280, 720), 1.0)
+    assert window_of((1920, 1080)) == ((1280, 720), 1.5)
+    assert window_of((640, 360)) == ((640, 360), 1.0)
+    assert window_of((1922, 1082)) == ((1922, 1082), 1.0)
 
 
 @pytest.mark.slow
@@ -231,7 +215,7 @@ def test_without_a_browser_the_way_to_one_is_told(grasp: Path, tmp_path: Path, m
 @pytest.mark.slow
 def test_a_film_that_cannot_be_written_leaves_nothing(grasp: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", shutil.which("false") or "")
-    status, told = film(grasp, "--out", tmp_path / "x.mp4", "--pace", 10)
+    status, told = film(grasp, "--out", tmp_path / "x.mp4", "--pace", 10, "--size", "320x240", "--no-plots")
     assert status == 3
     assert f"{tmp_path / 'x.mp4'} cannot be written: " in told
     assert list(tmp_path.iterdir()) == []
@@ -239,15 +223,12 @@ def test_a_film_that_cannot_be_written_leaves_nothing(grasp: Path, tmp_path: Pat
 
 @pytest.mark.slow
 def test_ctrl_c_ends_a_film_and_leaves_nothing(grasp: Path, tmp_path: Path):
-    program = "from handover.scenarios.cli.entry import main; main()"
-    command = [sys.executable, "-c", program, "film", str(grasp), "--out", str(tmp_path / "x.mp4"), "--pace", "0.1"]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)
-    begun = time.monotonic()
-    while not list(tmp_path.iterdir()):
-        assert process.poll() is None
-        assert time.monotonic() - begun < 120.0
-        time.sleep(0.1)
-    os.killpg(process.pid, signal.SIGINT)
-    assert process.communicate(timeout=60)[1].splitlines()[-1] == "Aborted!"
-    assert process.returncode == 130
+    going = Command("film", grasp, "--out", tmp_path / "x.mp4", "--pace", "0.1", "--size", "320x240")
+    until(lambda: any(tmp_path.iterdir()), 120.0)
+    for number in (going.pid, *family(going.pid)):  # as a terminal's Ctrl-C
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(number, signal.SIGINT)
+    ended = going.wait()
+    assert ended.status == 130
+    assert ended.errors.splitlines()[-1] == "Aborted!"
     assert list(tmp_path.iterdir()) == []

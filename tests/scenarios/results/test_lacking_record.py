@@ -1,8 +1,7 @@
 """A controller with fewer outputs than the scenario's own leaves out what shows them, with a line, and nothing else."""
 
-from fractions import Fraction
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -10,12 +9,12 @@ import pyarrow.parquet as pq
 import pytest
 from support.kept_runs import copied_run, kept_run
 from support.scenarios.flyer_runs import run
+from support.sketched_figures import Sketches
+from support.sketched_figures import sketches as sketches
 
 from handover.cosim.record.reader import Record
-from handover.cosim.system.signals import Signals
-from handover.cosim.system.system import System
 from handover.scenarios.catalog import SCENARIOS
-from handover.scenarios.experiment.experiment import Evaluator, Experiment, FmuOf, Outcome
+from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.free_flyer.parameters import ImpedanceParameters
 from handover.scenarios.free_flyer.push.impedance import FlyerImpedance
@@ -49,7 +48,7 @@ def select_columns(source: Path, target: Path, without: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", [n if n in ("ir_grasp", "flyer_impedance") else pytest.param(n, marks=pytest.mark.slow) for n in LACKING]
+    "name", [n if n == "flyer_impedance" else pytest.param(n, marks=pytest.mark.slow) for n in LACKING]
 )
 def test_what_needs_no_output_of_the_controller_is_drawn_in_its_colours(name: str, tmp_path: Path):
     unit, title, label, body = LACKING[name]
@@ -68,7 +67,7 @@ def test_what_needs_no_output_of_the_controller_is_drawn_in_its_colours(name: st
     assert f"{unit}." in line
 
 
-def test_the_page_says_in_a_line_what_is_left_out(tmp_path: Path):
+def test_page_and_figures_say_in_a_line_what_is_left_out(tmp_path: Path, sketches: Sketches):
     unit, title, *_ = LACKING["flyer_impedance"]
     run_folder = RunFolder.of_run(lacking("flyer_impedance", tmp_path / "r"))
     (line,) = write_run_page(run_folder)
@@ -77,19 +76,10 @@ def test_the_page_says_in_a_line_what_is_left_out(tmp_path: Path):
     assert page.count("Left out: ") == 1
     assert title.replace("'", "&#39;") in page
     assert all(f'id="{anchor}"' in page for anchor in ("time", "replay", "signals"))
-
-
-@pytest.mark.parametrize(
-    "name", [name if name == "flyer_impedance" else pytest.param(name, marks=pytest.mark.slow) for name in LACKING]
-)
-def test_so_do_figures(name: str, tmp_path: Path):
-    folder, experiment = lacking(name, tmp_path / "r"), SCENARIOS[name]()
-    (folder / "figures").mkdir()
-    faults, parameters = ToleratedFaults(), parse_parameters(SCENARIOS[name], [])
-    evaluator = experiment.evaluator(parameters)
-    draw_figures(experiment, parameters, evaluator, Record(folder / "signals.parquet"), folder / "figures", faults)
+    faults, parameters, record = ToleratedFaults(), ImpedanceParameters(), Record(tmp_path / "r" / "signals.parquet")
+    draw_figures(FlyerImpedance(), parameters, FlyerImpedance().evaluator(parameters), record, tmp_path, faults)
     assert [said for said in faults.lines if "what is drawn from" in said]
-    assert len(list((folder / "figures").glob("*.png"))) >= 1
+    assert sketches
 
 
 def test_curves_keep_their_colours_where_others_are_left_out(tmp_path: Path):
@@ -107,75 +97,31 @@ def test_curves_keep_their_colours_where_others_are_left_out(tmp_path: Path):
     assert [c.label for p in after if p.title.startswith("Force") for c in p.curves] == ["commanded"] * 3
 
 
-def test_a_signal_that_no_unit_of_the_scenario_has_is_an_error(tmp_path: Path):
-    record = LackingRecord(Record(_one_row(tmp_path)), FlyerImpedance.units)
-    for signal in ("robot.speed_of_light", "nobody.p_WB"):
+def test_what_a_units_outputs_would_have_been_is_known_and_a_signal_that_none_has_is_an_error(tmp_path: Path):
+    pq.write_table(pa.Table.from_pydict({"time": [0.0]}), tmp_path / "one.parquet")
+    own = {"own": "handover.plants.free_flyer.robot.free_flyer:FreeFlyer", "none": "nowhere:Block"}
+    record = LackingRecord(Record(tmp_path / "one.parquet"), {**FlyerImpedance.units, **own})
+    for signal in ("robot.speed_of_light", "nobody.p_WB", "none.q_WB"):
         with pytest.raises(KeyError, match=signal):
             record[signal]
     assert record["robot.p_WB"].shape == (1, 3)
-    assert record.lacking == ["robot.p_WB"]
+    assert record["own.q_WB"].shape == (1, 4)
+    assert record.lacking == ["robot.p_WB", "own.q_WB"]
 
 
-def test_a_block_of_ones_own_tells_what_its_outputs_would_have_been(tmp_path: Path):
-    units = {"robot": "handover.plants.free_flyer.robot.free_flyer:FreeFlyer", "none": "nowhere:Block"}
-    record = LackingRecord(Record(_one_row(tmp_path)), units)
-    assert record["robot.q_WB"].shape == (1, 4)
-    with pytest.raises(KeyError, match=r"none\.q_WB"):
-        record["none.q_WB"]
-
-
-def _one_row(folder: Path) -> Path:
-    pq.write_table(pa.Table.from_pydict({"time": [0.0]}), folder / "one.parquet")
-    return folder / "one.parquet"
-
-
-class Bare(Experiment[Any]):
-    """A scenario of somebody else's with neither plots nor figures, replay nor published values."""
-
-    name: ClassVar[str] = "bare"
-    title: ClassVar[str] = "a push, and nothing to be seen"
-    parameters_type: ClassVar[type[Any]] = ImpedanceParameters
-    units = FlyerImpedance.units
-    headline: ClassVar[tuple[str, ...]] = ()
-
-    def build(self, parameters: Any, seed: int, fmu: FmuOf) -> System:
-        return FlyerImpedance().build(parameters, seed, fmu)
-
-    def stop_time(self, parameters: Any) -> Fraction:  # noqa: ARG002
-        return Fraction(1, 2)
-
-    def evaluator(self, parameters: Any) -> Evaluator:
-        return Patient(parameters)
-
-    def cycle(self) -> tuple[str, ...]:
-        return ()
-
-
-class Patient(Evaluator):
-    """Waits for the end."""
-
-    def __init__(self, parameters: Any) -> None:
-        self.parameters = parameters
-
-    def __call__(self, t: float, signals: Signals) -> None:
-        pass
-
-    @property
-    def over(self) -> bool:
-        return False
-
-    def outcome(self) -> Outcome:
-        return Outcome(success=True, reason="it is over")
+LEFT = ("time_figures", "draw", "replay", "published")
+BARE: Any = type("Bare", (FlyerImpedance,), {"name": "bare", **{name: vars(Experiment)[name] for name in LEFT}})
+"""A scenario of somebody else's with neither plots nor figures, replay nor published values."""
 
 
 def test_a_scenario_without_plots_and_replay_has_a_page_without_these_sections(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    def bare(_name: str, _source: Any) -> type[Bare]:
-        return Bare
+    def bare(_name: str, _source: Any) -> Any:
+        return BARE
 
     monkeypatch.setattr(run_facts, "scenario_of", bare)
-    ended = run(Bare, tmp_path / "r", drawn=True)
+    ended = run(BARE, tmp_path / "r", drawn=True, stop=0.5)
     assert ended.left_out == ()
     page = (tmp_path / "r" / "report.html").read_text(encoding="utf-8")
     assert "Left out" not in page
