@@ -1,6 +1,5 @@
 """A scenario outside of the package, from the tutorial's text: run, listed, resumed, reported; and an installed one."""
 
-import importlib.util
 import json
 import os
 import shlex
@@ -8,7 +7,6 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -38,36 +36,6 @@ def test_it_runs_and_its_report_is_written_again_from_elsewhere(here: Path, tmp_
     assert (here / "first" / "figures" / "distance.png").is_file()
 
 
-def loaded(file: Path) -> Any:
-    """Return a module of the tutorial."""
-    spec = importlib.util.spec_from_file_location(f"tutorial_{file.stem}", file)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[module.__name__] = module  # dataclasses look for it
-    spec.loader.exec_module(module)
-    return module
-
-
-def test_the_tutorials_figure_is_the_distance_to_the_goal(here: Path):
-    reach = loaded(here / "reach.py")
-    record = {"arm.p_WE": np.array([[0.3, 0.6], [0.3, 0.5], [0.0, 0.2]])}
-    (figure,) = reach.TwoLinkReach().time_figures(reach.Parameters(), record)
-    assert figure.plots[0].curves[0].values == pytest.approx([0.0, 100.0, 500.0])
-
-
-def test_the_tutorials_generator_goes_on_from_a_state_bit_for_bit(here: Path):
-    encoders = loaded(here / "encoders.py")
-    u = encoders.Inputs(q=np.array([0.5, 1.0]))
-    block, other = (encoders.NoisyEncoders(encoders.Params(sigma=0.01, seed=seed)) for seed in (1, 2))
-    block.step(0.0, 0.01, u)
-    state = block.get_state()
-    ahead = [block.step(0.01 * k, 0.01, u).q_meas for k in range(1, 200)]
-    other.set_state(state)
-    assert np.array_equal(ahead, [other.step(0.01 * k, 0.01, u).q_meas for k in range(1, 200)])
-    assert np.std(np.subtract(ahead, u.q)) == pytest.approx(0.01, rel=0.1)
-
-
 def test_list_prints_scenario_controller_and_plant(here: Path):
     printed = succeeded(here, "list", SCENE)
     assert "An arm of two links reaches for a point" in printed
@@ -92,12 +60,6 @@ def test_a_run_that_was_interrupted_is_resumed_and_not_with_other_code(here: Pat
     assert resumed.status == 1, resumed.errors  # to the end, where it is not there yet
     assert f"this runs the code of reach:TwoLinkReach: {here / 'reach.py'}" in resumed.errors
     assert signals(here / "whole") == signals(here / "cut")
-
-
-def test_an_evaluators_checkpoints_are_written_with_its_parameters_under_any_name(here: Path):
-    code = (here / "reach.py").read_text()
-    (here / "reach.py").write_text(code.replace("self.parameters", "self.p"))
-    ran(here, "run", SCENE, "--no-report", "--checkpoint", "0.05", "-p", "patience=0.1", "--out", "named")
 
 
 COMMANDS = """

@@ -21,24 +21,28 @@ def has_start(scenario: str, place: str) -> bool:
     return kinds <= {Kind.REAL, Kind.INTEGER, Kind.BOOLEAN, Kind.ENUMERATION}
 
 
-PLACES = [(name, place) for name in SCENARIOS for place in named_scenario(name).places if has_start(name, place)]
-
-
-_FAST = ("ir_grasp:reflex", "vsl_hybrid:arm", "flyer_impedance:robot", "flyer_robot_to_human:decision")
-_OF_ROBOT_TO_HUMAN = [f"flyer_robot_to_human:{place}" for place in ("person", "impedance", "navigation", "robot")]
-_SLOW = ("helix_handover:vision", "helix_handover:arm", "ir_grasp:scene", "vsl_hybrid:planner", *_OF_ROBOT_TO_HUMAN)
+OF_UNITS = {
+    unit: f"{name}:{place}"
+    for name in SCENARIOS
+    for place, unit in named_scenario(name).units.items()
+    if has_start(name, place)
+}
+"""A place of each shipped unit for which there can be a start."""
+FAST = ("ir_grasp:reflex", "flyer_impedance:robot", "flyer_robot_to_human:decision")
+SLOW = ("helix_handover:vision", "ir_grasp:scene", "vsl_hybrid:planner", "flyer_robot_to_human:person")
 
 
 def tier(taken: str) -> tuple[pytest.MarkDecorator, ...]:
-    return () if taken in _FAST else (pytest.mark.slow,)
+    return () if taken in FAST else (pytest.mark.slow,)
 
 
-@pytest.mark.parametrize(("scenario", "place"), [pytest.param(*p, marks=tier(":".join(p))) for p in PLACES])
+@pytest.mark.parametrize("taken", [pytest.param(p, marks=tier(p)) for p in sorted({*OF_UNITS.values(), *FAST})])
 def test_each_place_has_a_start_that_declares_its_ports_as_the_shipped_unit_does(
-    scenario: str, place: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    taken: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
+    scenario, _, place = taken.partition(":")
     module = f"start_{scenario}_{place}"
-    (tmp_path / f"{module}.py").write_text(start_for(f"{scenario}:{place}", "Mine", module)[f"{module}.py"])
+    (tmp_path / f"{module}.py").write_text(start_for(taken, "Mine", module)[f"{module}.py"])
     monkeypatch.syspath_prepend(str(tmp_path))
     found = {v.name: v for v in describe(import_class(f"{module}:Mine")).variables}
     experiment = named_scenario(scenario)
@@ -51,7 +55,7 @@ def test_each_place_has_a_start_that_declares_its_ports_as_the_shipped_unit_does
             assert v.name not in found
 
 
-@pytest.mark.parametrize("taken", [pytest.param(p, marks=tier(p)) for p in (*_FAST, *_SLOW)])
+@pytest.mark.parametrize("taken", [pytest.param(p, marks=tier(p)) for p in (*FAST, *SLOW)])
 def test_the_start_of_each_place_runs(taken: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     scenario, _, place = taken.partition(":")
     module = f"running_{scenario}_{place}"

@@ -60,7 +60,6 @@ def test_a_sweep_varies_values_and_units_and_is_reported_from_elsewhere(here: Pa
     assert set(table.column("controller.damping")) == {1.0}
     assert "distance" in table.metrics
     runs = sorted((here / "swept" / "runs").iterdir())
-    np.testing.assert_allclose(torque(runs[2]), 0.5 * torque(runs[0]), rtol=1e-12)
     assert "has all of its runs; nothing was run" in call(here, *sweep).errors
     (here / "swept" / "runs.parquet").unlink()
     assert "it has no runs.parquet" in refused(here, "report", "swept")
@@ -72,10 +71,3 @@ def test_a_sweep_varies_values_and_units_and_is_reported_from_elsewhere(here: Pa
     assert "controller.damping" in page
     assert "else/Softer.fmi3.fmu" in page
     assert json.loads((runs[0] / "run.json").read_text())["source"]["folder"] == str(here)
-
-
-def test_a_run_is_summarised_as_json(here: Path):
-    done = call(here, "run", SCENE, *QUIET, "--json", "--out", "run")
-    summary = json.loads(done.output)
-    assert (done.status, summary["success"], summary["folder"]) == (1, False, "run")
-    assert summary["metrics"]["distance"]["unit"] == "m"
