@@ -8,6 +8,7 @@ import pytest
 from click.testing import CliRunner
 from support.constant_records import constant_record
 from support.scenarios.flyer_runs import run
+from support.sketched_figures import sketches as sketches
 
 from handover.cosim.record.reader import RecordedSignals
 from handover.fmus.build import cached
@@ -23,12 +24,13 @@ KINDS = {"zero": 0.0, "one": 1.0, "nan": np.nan, "infinite": np.inf}
 FIRST = "flyer_impedance"
 LIKE_OTHERS = {"vsl_hybrid", *(f"flyer_{task}" for task in ("human_to_robot", "failed_reception", "collaborative"))}
 """Scenarios whose figures, replay and evaluator are another's."""
-CASES = ((1, "one"), (2, "zero"), (2, "infinite"), (40, "nan"))
-"""Each kind of value and each number of rows, which matter each by itself."""
+CASES = ((2, "zero"), (40, "nan"))
 ALL = [(*some, name) for name in SCENARIOS if name not in LIKE_OTHERS for some in CASES]
+ALL += [(rows, kind, name) for rows, kind in ((1, "one"), (2, "infinite")) for name in (FIRST, "ir_grasp")]
 
 
 @pytest.mark.filterwarnings("ignore:.*:RuntimeWarning")
+@pytest.mark.usefixtures("sketches")
 @pytest.mark.parametrize(
     ("rows", "kind", "name"), [pytest.param(*one, marks=() if one[2] == FIRST else pytest.mark.slow) for one in ALL]
 )
@@ -79,7 +81,7 @@ def test_an_arm_whose_outputs_are_all_zero_and_figures_that_fail_cost_neither_ve
         raise ValueError("no two points of the arm differ")
 
     out = tmp_path / "r"
-    given = ["--unit", "arm=zero_arm:ZeroArm", "-p", "points=3", "-p", "settle=0.2", "--out", str(out)]
+    given = ["--unit", "arm=support.scenarios.zero_arm:ZeroArm", "-p", "points=3", "-p", "settle=0.2", "--out", str(out)]
     with monkeypatch.context() as patched:
         patched.setattr(SCENARIOS["vsl_model_based"], "replay", replay)
         patched.setattr(SCENARIOS["vsl_model_based"], "time_figures", replay)

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow.parquet as pq
 import pytest
 from matplotlib.axes import Axes
 from support.kept_runs import kept_run
@@ -24,11 +23,7 @@ SHORT = {
     "ir_grasp": (),
     "flyer_impedance": (),
     "vsl_hybrid": ("points=5", "settle=1", "speed=0.2"),
-    "helix_handover": ("patience=1",),
-    "flyer_robot_to_human": ("patience=1",),
 }
-SLOW = ("helix_handover", "flyer_robot_to_human")
-NAMES = [pytest.param(name, marks=pytest.mark.slow if name in SLOW else ()) for name in SHORT]
 
 
 class Run:
@@ -63,43 +58,21 @@ def runs() -> Runs:
     return Runs()
 
 
-def check(plots: list[TimePlot], record: Record) -> None:
-    for plot in plots:
+@pytest.mark.parametrize("name", SHORT)
+def test_curves_are_as_long_as_the_record_and_phases_are_named(name: str, runs: Runs):
+    done = runs[name]
+    assert 3 <= len(done.plots) <= 15
+    for plot in done.plots.values():
         labels = [c.label for c in plot.curves]
         assert len(set(labels)) == len(labels)
-        assert all(c.values.shape == record.time.shape for c in plot.curves), plot.title
+        assert all(c.values.shape == done.record.time.shape for c in plot.curves), plot.title
+        assert any(np.isfinite(c.values).any() for c in plot.curves), plot.title
         assert all(p.begin <= p.end for p in plot.phases), plot.title
         assert all(a.end == b.begin and a.name != b.name for a, b in pairwise(plot.phases)), plot.title
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_curves_are_as_long_as_the_record_and_phases_are_named(name: str, runs: Runs):
-    done = runs[name]
-    assert 3 <= len(done.plots) <= 15
-    check(list(done.plots.values()), done.record)
-    assert all(any(np.isfinite(c.values).any() for c in p.curves) for p in done.plots.values())
-
-
-@pytest.mark.parametrize("rows", [1, 2])
-@pytest.mark.parametrize("name", NAMES)
-def test_a_record_of_a_row_or_two_is_no_fault(name: str, rows: int, runs: Runs, tmp_path: Path):
-    done = runs[name]
-    pq.write_table(pq.read_table(done.file).slice(0, rows), tmp_path / "signals.parquet")
-    short = Record(tmp_path / "signals.parquet")
-    check(list(done.experiment.plots(done.parameters, short)), short)
-
-
 def test_every_scenario_has_plots_of_its_own():
     assert all(s.time_figures is not Experiment.time_figures for s in SCENARIOS.values())
-
-
-@pytest.mark.slow
-def test_the_helix_true_distance_ends_where_the_summary_says(runs: Runs):
-    done = runs["helix_handover"]
-    curve = done.curve("Distance to the goal", "gripper to ball, true")
-    assert curve.values[-1] == pytest.approx(1000 * done.metric("final_distance"))
-    descends, grasps = done.plots["Distance to the goal"].levels
-    assert (descends.value, grasps.value) == pytest.approx((50.0, 3.0))
 
 
 def test_a_push_disagrees_with_the_model_as_much_as_the_summary_says(runs: Runs):
@@ -120,50 +93,25 @@ def test_joints_are_in_degrees_and_the_error_is_drawn_on_the_path_only(runs: Run
     assert np.nanmax(error) >= 1000 * done.metric("max_error") - 1e-9
 
 
-def test_fingers_that_see_nothing_are_not_drawn(runs: Runs):
+def test_fingers_that_see_nothing_are_not_drawn_and_a_cost_as_measured_only_while_thumb_and_ring_see(runs: Runs):
     done = runs["ir_grasp"]
-    title = "Distances of the fingers from the object"
+    distance = done.record["reflex.distance"]
     for i, finger in enumerate(("thumb", "index", "ring")):
-        seen = done.curve(title, f"{finger}, as seen").values
-        assert np.array_equal(np.isnan(seen), done.record["reflex.distance"][:, i] >= 0.065)
-    assert done.plots["Cost of thumb and ring, [Luberto] eq. (4)"].logarithmic
-
-
-def test_a_cost_is_drawn_as_measured_only_while_thumb_and_ring_see(runs: Runs):
-    done = runs["ir_grasp"]
-    title = "Cost of thumb and ring, [Luberto] eq. (4)"
-    measured, partly = done.plots[title].curves
-    seeing = (done.record["reflex.distance"][:, [0, 2]] < 0.065).sum(axis=1)
+        seen = done.curve("Distances of the fingers from the object", f"{finger}, as seen").values
+        assert np.array_equal(np.isnan(seen), distance[:, i] >= 0.065)
+    plot = done.plots["Cost of thumb and ring, [Luberto] eq. (4)"]
+    measured, partly = plot.curves
+    assert plot.logarithmic
+    seeing = (distance[:, [0, 2]] < 0.065).sum(axis=1)
     assert {0, 1, 2} == set(seeing.tolist())
     assert np.array_equal(np.isfinite(measured.values), seeing == 2)
     assert np.array_equal(np.isfinite(partly.values), seeing == 1)
-    assert partly.stroke == "dotted"
-    assert "sees nothing" in partly.label
     assert np.nanmin(measured.values) > 0.0
     assert np.nanmax(partly.values) < 3025.0
 
 
-@pytest.mark.slow
-def test_commands_far_beyond_the_thrusters_run_out_of_the_axes(runs: Runs):
-    done = runs["flyer_robot_to_human"]
-    plots = [done.plots[f"Force of the thrusters along {axis} of B"] for axis in "xyz"]
-    commanded = done.curve(plots[0].title, "commanded").values
-    asked = done.record["impedance.f_cmd"] + done.record["pose.f_cmd"]
-    assert commanded == pytest.approx(asked[:, 0])
-    given = float(np.abs(done.record["thrusters.f_B"]).max())
-    limit = min(1.1 * max(given, float(np.abs(asked).max())), 2.0 * given)
-    assert all(plot.limits == pytest.approx((-limit, limit)) for plot in plots)
-
-
-def test_no_plot_of_a_push_has_more_than_three_curves(runs: Runs):
-    plots = runs["flyer_impedance"].plots.values()
-    assert max(len(plot.curves) for plot in plots) == 3
-    noisy = [plot for plot in plots if plot.title.startswith(("Force of", "Torque of"))]
-    assert [[c.label for c in plot.curves] for plot in noisy] == [["given", "commanded"]] * 6
-
-
 @pytest.mark.usefixtures("empty_figures")
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", ["ir_grasp", "flyer_impedance"])
 def test_page_and_figure_draw_the_same_curves_in_the_same_colours(
     name: str, runs: Runs, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ):

@@ -17,11 +17,12 @@ from handover.scenarios.reporting.run_page import published_section
 from handover.scenarios.results.run_facts import RunFacts
 from handover.scenarios.results.run_folder import RunFolder
 
-RUNS = {"ir_grasp": ((), 3), "flyer_impedance": ((), 2)}
-SLOW_RUNS = {
-    "flyer_robot_to_human": (("behaviour=compliant",), 3),
-    "flyer_human_to_robot": ((), 1),
-}
+RUNS = (
+    ("ir_grasp", (), 3),
+    ("flyer_impedance", (), 2),
+    pytest.param("flyer_robot_to_human", ("behaviour=compliant",), 3, marks=pytest.mark.slow),
+    pytest.param("flyer_human_to_robot", (), 1, marks=pytest.mark.slow),
+)
 
 
 def values_of(scenario: str, given: tuple[str, ...]) -> list[PublishedValue]:
@@ -29,9 +30,8 @@ def values_of(scenario: str, given: tuple[str, ...]) -> list[PublishedValue]:
     return list(experiment().published(parse_parameters(experiment, given)))
 
 
-@pytest.mark.parametrize("scenario", [*RUNS, *(pytest.param(s, marks=pytest.mark.slow) for s in SLOW_RUNS)])
-def test_a_run_like_the_published_stands_beside_what_was_published(scenario: str):
-    given, number = {**RUNS, **SLOW_RUNS}[scenario]
+@pytest.mark.parametrize(("scenario", "given", "number"), RUNS)
+def test_a_run_like_the_published_stands_beside_what_was_published(scenario: str, given: tuple[str, ...], number: int):
     folder = kept_run("run", scenario, *(text for value in given for text in ("-p", value)), "--no-report")
     assert_published(folder, scenario, given, number)
 
@@ -68,26 +68,21 @@ def test_every_published_value_is_in_the_paper_file(scenario: str):
         assert value.value in np.ravel(entry["value"])
 
 
-def test_the_times_of_the_thesis_are_those_of_the_step_size():
-    first = {v.metric: v for v in values_of("helix_handover", ("alpha=0.2",))}["arm_time"]
+def test_what_was_published_is_of_the_same_step_size_and_what_differs_is_reported():
+    values = values_of("helix_handover", ("alpha=0.2",))
+    first = {v.metric: v for v in values}["arm_time"]
     assert (first.value, first.limits) == (39.6, (28.4, 57.6))
-
-
-def test_what_differs_from_the_published_runs_is_reported():
     note = values_of("helix_handover", ("alpha=0.2", "tuning=thesis"))[0].note
     assert note == "its control period was 1.51 s"
-    assert values_of("helix_handover", ("alpha=0.3",)) == []
 
 
-@pytest.mark.parametrize(
-    ("scenario", "given"),
-    [
+def test_a_run_unlike_the_published_stands_for_itself():
+    for scenario, given in (
         ("ir_grasp", "strategy=blind"),
         ("flyer_impedance", "force=2"),
         ("flyer_robot_to_human", "p_WG_handover=0,0,0"),
         ("helix_handover", "cover=left"),
+        ("helix_handover", "alpha=0.3"),
         ("vsl_hybrid", "load=0.075"),
-    ],
-)
-def test_a_run_unlike_the_published_stands_for_itself(scenario: str, given: str):
-    assert values_of(scenario, (given,)) == []
+    ):
+        assert values_of(scenario, (given,)) == [], (scenario, given)

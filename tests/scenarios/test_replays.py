@@ -34,7 +34,7 @@ LARGEST = 400_000
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=() if n in FIRST else (pytest.mark.slow,)) for n in SCENARIOS])
 def test_a_scenario_is_shown_in_space(name: str):
-    begins = ("--stop", "1") if name.startswith("helix_") and name != "helix_use_case" else ()
+    begins = ("--stop", "1") if name.startswith(("helix_", "vsl_")) and name not in (*FIRST, "helix_use_case") else ()
     record = Record(kept_run("run", name, *begins, "--no-report") / "signals.parquet")
     scenario, parameters = SCENARIOS[name](), parse_parameters(SCENARIOS[name], ())
     replay = scenario.replay(parameters, record)
