@@ -40,17 +40,9 @@ def repository(tmp_path: Path) -> Path:
     ids=["script", "module with PYTHONPATH=.", "code"],
 )
 def test_a_repository_with_folders_of_the_same_names_keeps_them(repository: Path, added: str, call: list[str]):
-    inherited = os.environ.get("PYTHONPATH", "")
-    path = os.pathsep.join(part for part in (added, inherited) if part)
-    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
-    done = subprocess.run(
-        [sys.executable, *call],
-        cwd=repository,
-        env={**environment, **({"PYTHONPATH": path} if path else {})},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, (added, os.environ.get("PYTHONPATH"))))}
+    command = [sys.executable, *call]
+    done = subprocess.run(command, cwd=repository, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     scenarios, units = map(int, done.stdout.split())
     assert scenarios >= 9

@@ -63,50 +63,6 @@ def outputs_of(notebook: Any) -> dict[str, list[Output]]:
 COMMITTED = outputs_of(read())
 
 
-def shown(begin: str, kind: str) -> str:
-    """Return what a cell shows of a kind, a MIME type; the cell is named by how it begins."""
-    (outputs,) = (outputs for line, outputs in COMMITTED.items() if line.startswith(begin))
-    found = [o["data"][kind] for o in outputs if kind in o.get("data", {})]
-    assert found, [list(o.get("data", o)) for o in outputs]
-    return found[-1]
-
-
-def printed(begin: str) -> str:
-    (outputs,) = (outputs for line, outputs in COMMITTED.items() if line.startswith(begin))
-    return "".join(o["text"] for o in outputs if o["output_type"] == "stream")
-
-
-def test_a_run_shows_its_verdict_and_plots():
-    html = shown("run = ", "text/html")
-    assert "succeeded</span>" in html
-    assert html.count("data:image/png;base64,") == 2
-
-
-def test_a_plot_is_a_picture():
-    assert len(shown("run.plot(", "image/png")) > 20_000
-
-
-def test_numbers_have_units():
-    assert "0.150 mm - how far the object was pushed" in printed("moved = ")
-    assert "(945, 2) m" in printed("moved = ")
-
-
-def test_a_system_is_a_graph_and_a_unit_a_table():
-    assert shown("handover.system(", "text/html").count("<rect") == 5
-    assert "<b>Inputs" in shown("handover.describe(", "text/html")
-
-
-def test_a_campaign_shows_its_rates():
-    html = shown("campaign = ", "text/html")
-    assert "2 of 2" in html
-    assert "0 of 2" in html
-
-
-def test_steps_and_episodes_end():
-    assert "m after" in printed("with handover.open(")
-    assert printed("env = ").split()[0] in ("0.0", "1.0")
-
-
 def test_the_file_is_small_and_knows_nothing_of_the_machine_that_made_it():
     text = NOTEBOOK.read_text(encoding="utf-8")
     assert len(text) < 1_000_000

@@ -22,7 +22,6 @@ from support.commands import Ended, run_command
 from support.in_process_pool import use_in_process_pool
 from support.kept_runs import copied_run, kept_run
 
-from handover.cosim.stepping.options import Algorithm
 from handover.fmus import interpreter
 from handover.fmus.build import cached
 from handover.fmus.catalog import UNITS
@@ -71,19 +70,10 @@ def test_every_command_is_run_by_a_test():
 
 def test_the_citation_is_of_this_version():
     cited, own = (
-        re.search(r'^version\W+([\d.]+)"?$', (ROOT / file).read_text(), flags=re.MULTILINE)
+        re.findall(r'^version\W+([\d.]+)"?$', (ROOT / file).read_text(), flags=re.MULTILINE)
         for file in ("CITATION.cff", "pyproject.toml")
     )
-    assert cited is not None
-    assert own is not None
-    assert cited[1] == own[1]
-
-
-def test_the_make_targets_exist():
-    targets = set(re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(), flags=re.MULTILINE))
-    named = set(re.findall(r"^make ([\w-]+)$", README, flags=re.MULTILINE))
-    assert named == {"demo", "test"}
-    assert named <= targets
+    assert cited == own != []
 
 
 def test_every_path_that_is_linked_exists():
@@ -104,11 +94,6 @@ def test_the_table_of_robots_names_their_units_and_scenarios():
 
 def is_plant(unit: str) -> bool:
     return UNITS[unit].block.startswith("handover.plants.")
-
-
-def test_the_table_of_options_names_every_algorithm():
-    (row,) = re.findall(r"^\| `--algorithm` \|(.*)$", README, re.MULTILINE)
-    assert {a.value for a in Algorithm} <= {*re.findall(r"`([^`]+)`", row)}
 
 
 @pytest.mark.slow
@@ -185,12 +170,19 @@ def test_units_pass_their_checks_and_one_brings_an_experiment_along_that_its_che
     assert "outputs compared, all equal" in succeeded(command_with(" check units/FreeFlyer"), folder)
 
 
-@pytest.mark.slow
+@pytest.mark.platforms
 def test_a_unit_is_built_for_all_platforms(folder: Path):
     succeeded(command_with(" --platform all "), folder)
     with zipfile.ZipFile(folder / "units" / "Push.fmi3.fmu") as archive:
         libraries = [name for name in archive.namelist() if name.startswith("binaries/")]
     assert len(libraries) == len(TARGETS)
+
+
+def test_commands_that_compile_for_all_platforms_or_film_have_options_that_there_are():
+    """What they do, the first in the tier `platforms`, the other in tests/scenarios/film."""
+    for part in (" --platform all ", " film "):
+        done = CliRunner().invoke(main, [*shlex.split(command_with(part))[1:], "--help"])
+        assert done.exit_code == 0, done.output
 
 
 @pytest.mark.slow
@@ -217,18 +209,6 @@ def test_data_beside_a_unit_goes_along_with_it(tmp_path: Path):
     checks = [handover(f"handover check {out}/Spring.fmi3.fmu", tmp_path) for out in ("with", "without")]
     assert [done.status for done in checks] == [0, 1]
     assert file in checks[1].output
-
-
-def test_what_a_unit_in_another_tool_needs_is_run_here_or_an_extra():
-    """Commands of this package are counted above; programs of others are run as the whole blocks in which they are."""
-    section = README.partition("\n## A unit in another tool\n")[2].partition("\n## ")[0]
-    blocks = [text for kind, text in BLOCKS if not kind and text in section]
-    lines = {line for text in blocks for line in text.splitlines() if not line.startswith(".venv/bin/handover ")}
-    others = lines - {*block_with("./c_host").splitlines(), *block_with("./ecos ").splitlines()}
-    install = re.compile(r'[.]venv/bin/python -m pip install --editable "[.]\[(\w+)\]"')
-    extras = {found[1] if (found := install.fullmatch(line)) else line for line in others}
-    assert extras == {"cross", "standalone"}
-    assert extras <= {*re.findall(r"^(\w+) = \[", (ROOT / "pyproject.toml").read_text(), flags=re.MULTILINE)}
 
 
 def command_with(part: str) -> str:
@@ -265,10 +245,6 @@ def test_programs_print_and_make_what_they_say(
     assert [len([*tmp_path.glob(file)]) for file in made] == [1] * len(made)
 
 
-def test_a_run_is_five_lines():
-    assert len(IN_PYTHON.split("\n\n")[1].splitlines()) + 1 <= 5
-
-
 def test_a_block_of_ones_own_is_built(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     (tmp_path / "spring.py").write_text(OWN_BLOCK)
     monkeypatch.syspath_prepend(str(tmp_path))
@@ -290,24 +266,21 @@ def arguments_of(command: str) -> Sequence[str]:
 @pytest.mark.slow
 @pytest.mark.parametrize("command", [c for c in RUNS if not any(text in c for text in (*OF_FILES, " --out "))])
 def test_the_runs_succeed(command: str):
-    """Those of the Helix up to their second second: whole ones are in tests/scenarios/helix."""
-    begins = ("--stop", "2") if " helix_" in command else ()
+    """Those of the Helix for half a second: whole ones are in tests/scenarios/helix."""
+    begins = ("--stop", "0.5") if " helix_" in command else ()
     summary = json.loads((kept_run(*arguments_of(command), *begins) / "summary.json").read_text())
     assert summary["complete"]
     assert summary["success"] is not bool(begins), summary["reason"]
 
 
 @pytest.mark.slow
-def test_a_run_is_reported_again_and_filmed(tmp_path: Path):
+def test_a_run_is_reported_again(tmp_path: Path):
     (command,) = (c for c in RUNS if c.endswith(" --out r"))
     copied_run(tmp_path / "r", *arguments_of(command)[:-1])
     assert json.loads((tmp_path / "r" / "summary.json").read_text())["success"]
     (tmp_path / "r" / "report.html").unlink()
     succeeded(command_with(" report "), tmp_path)
     assert (tmp_path / "r" / "report.html").is_file()
-    if shutil.which("chromium"):
-        succeeded(command_with(" film "), tmp_path, "--size", "320x240", "--pace", "40")
-        assert (tmp_path / "grasp.gif").is_file()
 
 
 @pytest.mark.slow
@@ -326,7 +299,7 @@ def test_files_are_run(folder: Path):
     of_input = command_with(" --input ")
     shell("".join(line + "\n" for line in block_with(of_input).splitlines() if line.startswith("printf ")), folder)
     assert "succeeded" in succeeded(of_input, folder, "--no-report")
-    done = handover(command_with(" --unit arm=units/"), folder, "--stop", "2", "--no-report", "--out", "other_arm")
+    done = handover(command_with(" --unit arm=units/"), folder, "--stop", "0.5", "--no-report", "--out", "other_arm")
     assert done.status == 1, done.errors  # it ends before the grasp
     run = json.loads((folder / "other_arm" / "run.json").read_text())
     assert run["units"]["arm"]["fmu"] == "TendonArm.fmi2.fmu"
@@ -339,7 +312,7 @@ def test_what_a_place_needs_is_listed(tmp_path: Path):
 @pytest.mark.slow
 def test_campaigns_end_with_a_page(tmp_path: Path):
     grasps, loads = (c for c in COMMANDS if " sweep " in c and c not in block_with(" compare "))
-    succeeded(grasps, tmp_path, "--repeat", "1")
+    succeeded(grasps, tmp_path, "--repeat", "1", "--stop", "0.5")
     assert (tmp_path / "c" / "report.html").is_file()
     succeeded(loads, tmp_path, "--stop", "0.5", "--no-report")
     (campaign,) = (tmp_path / "campaigns").iterdir()
@@ -364,7 +337,7 @@ def test_a_published_experiment_is_begun(tmp_path: Path, monkeypatch: pytest.Mon
 def test_campaigns_are_compared(tmp_path: Path):
     ours, theirs, compare = block_with(" compare ").splitlines()
     for command in (ours, theirs):
-        succeeded(command, tmp_path, "--repeat", "2", "--no-report")
+        succeeded(command, tmp_path, "--repeat", "2", "--no-report", "--stop", "0.5")
     succeeded(compare, tmp_path)
     comparison = tmp_path / compare.split()[-1]
     assert {"report.html", "comparison.csv", "comparison.json", "figures"} == {p.name for p in comparison.iterdir()}
