@@ -80,8 +80,8 @@ def test_an_arm_whose_outputs_are_all_zero_and_figures_that_fail_cost_neither_ve
     def replay(_scenario: object, _parameters: object, _record: object) -> None:
         raise ValueError("no two points of the arm differ")
 
-    out = tmp_path / "r"
-    given = ["--unit", "arm=support.scenarios.zero_arm:ZeroArm", "-p", "points=3", "-p", "settle=0.2", "--out", str(out)]
+    out, arm = tmp_path / "r", "arm=support.scenarios.zero_arm:ZeroArm"
+    given = ["--unit", arm, "-p", "points=3", "-p", "settle=0.2", "--out", str(out)]
     with monkeypatch.context() as patched:
         patched.setattr(SCENARIOS["vsl_model_based"], "replay", replay)
         patched.setattr(SCENARIOS["vsl_model_based"], "time_figures", replay)
