@@ -154,10 +154,10 @@ def test_a_run_that_was_killed_is_put_aside_and_one_that_ended_is_not(tmp_path: 
 
 def test_who_may_not_take_part_leaves_nothing(tmp_path: Path, wording: Wording):
     study = StudyFolder.opened(tmp_path / "out", PLAN)
-    may_not = {"consent": False, "eligibility": [True, False, True], "device": "script"}
-    for changed in (may_not, {"pilot": True}):
+    may_not: dict[str, Any] = {"consent": False, "eligibility": [True, False, True], "device": "script"}
+    for who in (replace(session(1), **may_not), replace(session(1), pilot=True)):
         with pytest.raises(InvalidRunFolder) as refused:
-            study.begin(replace(session(1), **changed))
+            study.begin(who)
         wording.check(refused.value)
     assert study.numbers == []
     assert not list(study.participants.iterdir())

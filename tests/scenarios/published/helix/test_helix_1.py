@@ -197,7 +197,7 @@ def test_times_are_drawn_and_errors_of_runs_that_left_a_record(tmp_path: Path, s
 
 
 PLAIN = {0.1: spread(41.0, 1.0), 0.2: spread(29.0, 1.0), 0.4: spread(16.0, 0.5)}
-DEFAULTS = {"lost_pictures": 0.0, "tremor": 0.001, "drift": 0.003, "jitter": 0.0, "detector": "joint"}
+DEFAULTS: dict[str, Any] = {"lost_pictures": 0.0, "tremor": 0.001, "drift": 0.003, "jitter": 0.0, "detector": "joint"}
 
 
 def table_with(amiss: Mapping[str, Any], times: Sequence[float | None]) -> CampaignTable:
@@ -255,8 +255,8 @@ def test_the_published_times_stand_above_ours_and_two_are_too_few_to_compare(wor
 def test_runs_on_the_fitted_arm_have_tables_claims_and_figures_of_their_own(tmp_path: Path, sketches: Sketches):
     arm: dict[str, Any] = {"arm.EA": 47.0, "arm.natural_length": "0.134,0.2554,0.2554", "radius": 0.14, "height": -0.62}
     shipped: dict[str, Any] = {"arm.EA": float("nan"), "arm.natural_length": "", "radius": 0.16, "height": -0.6}
-    fitted = table_of({**PLAIN, 0.1: spread(100.0, 50.0)}, **{**DEFAULTS, **arm})
-    both = [*table_of(PLAIN, **{**DEFAULTS, **shipped}).rows, *fitted.rows]
+    fitted = table_of({**PLAIN, 0.1: spread(100.0, 50.0)}, **DEFAULTS, **arm)
+    both = [*table_of(PLAIN, **DEFAULTS, **shipped).rows, *fitted.rows]
     table = made_table({**row, "run": f"{k}_{row['run']}"} for k, row in enumerate(both))
     assert Helix1().tables(table)[4].title == "Table 1, with the thesis's settings, arm fitted to fig. 9"
     claims, takes = Helix1().claims(table), "t step size 0.1 the arm takes 104.8 s on average"

@@ -113,11 +113,19 @@ def test_a_device_that_falls_silent_makes_the_round_void(tmp_path: Path, monkeyp
         assert told(page, "screen")["round"] == 1
 
 
-class RecordedTrial(EndlessTrial):
+class RecordedTrial:
     """A trial of one state, whose process exits some polls after it."""
 
+    hand, scene, newest, led = HAND, "a scene", None, None
+
     def __init__(self) -> None:
-        self._states, self._polls, self.led = 1, 21, None
+        self._states, self._polls = 1, 21
+
+    def scene_content(self) -> dict[str, Any]:
+        return {}
+
+    def go(self) -> None:
+        pass
 
     @property
     def is_running(self) -> bool:
