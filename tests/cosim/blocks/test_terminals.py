@@ -5,6 +5,7 @@ from typing import Annotated, Any
 
 import numpy as np
 import pytest
+from support.wording import Wording
 
 from handover.cosim.blocks.declarations import DeclarationError
 from handover.cosim.blocks.description import describe
@@ -56,20 +57,17 @@ class Plant:
     def set_state(self, state: bytes) -> None: ...
 
 
-def with_terminals(*terminals: Any) -> type[Any]:
+def with_terminals(terminals: Any) -> type[Any]:
     return type("Declared", (Plant,), {"terminals": terminals})
 
 
-def test_members_have_their_ports_names_unless_others_are_given():
+def test_members_have_their_ports_names_unless_others_are_given_and_the_kind_says_the_matching_rule():
     block = with_terminals(
-        terminal("tip", TerminalKind.POSE, "q", position="p"), terminal("load", TerminalKind.WRENCH, "f", "tau")
+        (terminal("tip", TerminalKind.POSE, "q", position="p"), terminal("load", TerminalKind.WRENCH, "f", "tau"))
     )
     tip, load = describe(block).terminals
     assert (tip.members, load.members) == ({"q": "q", "position": "p"}, {"f": "f", "tau": "tau"})
     assert describe(Plant).terminals == ()
-
-
-def test_the_kind_says_the_matching_rule():
     rules = {kind: kind.rule for kind in TerminalKind}
     assert rules[TerminalKind.POSE] is rules[TerminalKind.COMMAND] is MatchingRule.PLUG
     assert rules[TerminalKind.PICTURES] is rules[TerminalKind.MEASUREMENTS] is MatchingRule.BUS
@@ -78,44 +76,32 @@ def test_the_kind_says_the_matching_rule():
 
 
 @pytest.mark.parametrize(
-    ("declared", "wanted"),
+    "declared",
     [
-        (
-            terminal("eyes", TerminalKind.PICTURES, "left", "right"),
-            r"Declared\.terminals: 'eyes': left \(.*width=1280.*\) and right \(.*width=64.*\) differ in shape: the",
+        pytest.param((terminal("eyes", TerminalKind.PICTURES, "left", "right"),), id="shapes"),
+        pytest.param((terminal("eyes", TerminalKind.PICTURES, "left", "f"),), id="kinds"),
+        pytest.param((terminal("tip", TerminalKind.POSE, "p"),), id="a member misses"),
+        pytest.param((terminal("tip", TerminalKind.POSE, "p", "r"),), id="one twice"),
+        pytest.param((terminal("load", TerminalKind.WRENCH, "f", "left"),), id="another member"),
+        pytest.param((terminal("tip", TerminalKind.COMMAND, "p", "f"),), id="inputs and outputs"),
+        pytest.param((terminal("tip", TerminalKind.COMMAND, "p", "x"),), id="no port"),
+        pytest.param((terminal("tip", TerminalKind.COMMAND, "p", x="p"),), id="two names"),
+        pytest.param((terminal("tip", TerminalKind.COMMAND),), id="none"),
+        pytest.param((terminal("p", TerminalKind.COMMAND, "q"),), id="a port's name"),
+        pytest.param((terminal("mass", TerminalKind.COMMAND, "q"),), id="a parameter's name"),
+        pytest.param((terminal("a tip", TerminalKind.COMMAND, "q"),), id="no name"),
+        pytest.param(("tip",), id="a text"),
+        pytest.param({"tip": ("p", "q")}, id="a mapping"),
+        pytest.param(
+            (terminal("tip", TerminalKind.POSE, "p", "q"), terminal("place", TerminalKind.COMMAND, "r", at="p")),
+            id="a port in two",
         ),
-        (terminal("eyes", TerminalKind.PICTURES, "left", "f"), r"f is real \[3\] N, but pictures are binary"),
-        (
-            terminal("tip", TerminalKind.POSE, "p"),
-            r"'tip': it has no quaternion: a pose has a position \(real \[3\] m\) and a quaternion \(real \[4\]\)",
+        pytest.param(
+            (terminal("tip", TerminalKind.COMMAND, "p"), terminal("tip", TerminalKind.POSE, "p")), id="all faults"
         ),
-        (terminal("tip", TerminalKind.POSE, "p", "r"), r"r is one more real \[3\] m, but a pose has"),
-        (terminal("load", TerminalKind.WRENCH, "f", "left"), r"left is binary, but a wrench has a force"),
-        (terminal("tip", TerminalKind.COMMAND, "p", "f"), r"f and p are inputs and outputs: make two terminals"),
-        (terminal("tip", TerminalKind.COMMAND, "p", "x"), r"there is no input or output 'x'"),
-        (terminal("tip", TerminalKind.COMMAND, "p", x="p"), r"p is there under two names"),
-        (terminal("tip", TerminalKind.COMMAND), r"'tip': it has no members"),
-        (terminal("p", TerminalKind.COMMAND, "q"), r"'p': a port has this name; y\.p and u\.p would stand for either"),
-        (terminal("mass", TerminalKind.COMMAND, "q"), r"'mass': a parameter has this name, and u\.mass .*; rename one"),
-        (terminal("a tip", TerminalKind.COMMAND, "q"), r"letters, digits and underscores"),
-        ("tip", r"'tip' is not a terminal, such as \(terminal\("),
     ],
 )
-def test_what_is_no_terminal_is_refused_with_the_reason(declared: Any, wanted: str):
-    with pytest.raises(DeclarationError, match=wanted):
+def test_what_is_no_terminal_is_refused_with_the_reason(declared: Any, wording: Wording):
+    with pytest.raises(DeclarationError) as refused:
         describe(with_terminals(declared))
-
-
-def test_a_port_in_two_terminals_is_refused_with_the_other_one():
-    shared = terminal("tip", TerminalKind.POSE, "p", "q"), terminal("place", TerminalKind.COMMAND, "r", at="p")
-    with pytest.raises(DeclarationError, match=r"terminals: 'place': p is in 'tip', too; a port is in one terminal"):
-        describe(with_terminals(*shared))
-
-
-def test_all_faults_are_told_at_once_and_names_are_unique():
-    twice = terminal("tip", TerminalKind.COMMAND, "p"), terminal("tip", TerminalKind.POSE, "p")
-    with pytest.raises(DeclarationError, match=r"'tip': another terminal has this name.*; 'tip': it has no quaternion"):
-        describe(with_terminals(*twice))
-    block = type("Declared", (Plant,), {"terminals": {"tip": ("p", "q")}})
-    with pytest.raises(DeclarationError, match=r"terminals: \{'tip'.*\} is not a tuple of terminals, such as"):
-        describe(block)
+    wording.check(refused.value)
