@@ -52,8 +52,9 @@ def test_what_cannot_be_built_is_refused_before_anything_is_written(
     (tmp_path / "ends_itself.py").write_text("import sys\n\nsys.exit(5)\n")
     monkeypatch.syspath_prepend(tmp_path)
     for block, error, given in REFUSED:
+        call: dict[str, Any] = {"fmi": 3, "out_dir": tmp_path / "out", **given}
         with pytest.raises(error) as refused:
-            build_block(block, **{"fmi": 3, "out_dir": tmp_path / "out", **given})
+            build_block(block, **call)
         wording.check(refused.value)
         assert not (tmp_path / "out").exists()
 

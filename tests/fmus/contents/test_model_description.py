@@ -183,7 +183,7 @@ def test_a_default_experiment_is_of_whole_steps(step: str, stop: float):
 def test_what_an_fmu_could_not_tell_apart_or_xml_not_carry_is_refused(wording: Wording):
     other = enum.IntEnum("Gear", {"PARK": 0})  # type: ignore
     mile = dataclasses.replace(describe(declarations.Declarations).outputs[0].unit, factor=1609.0)
-    refused: list[tuple[type[Exception], Callable[[Model], str], dict[str, tuple[Any, Any]]]] = [
+    refused: list[tuple[type[Exception], Callable[[Model], bytes], dict[str, tuple[Any, Any]]]] = [
         (AmbiguousName, fmi3_description, {"gear": (other, parameter(other(0), "another Gear"))}),
         (AmbiguousName, fmi2_description, {"Gear": (Number, parameter(0.0, "named as the type of gear_out"))}),
         (AmbiguousName, fmi3_description, {"far": (Annotated[float, mile], parameter(0.0, "in another km"))}),

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 from support.c_programs import compiled
@@ -114,7 +115,7 @@ def test_a_folder_and_a_module_in_any_script_serve_in_any_locale(unpacked: Ctype
     resources = shutil.copytree(unpacked.folder / "resources", tmp_path / "größe 100% #a" / "resources")
     with (resources / "sources" / "support" / "sample_units" / "every_kind.py").open("a", encoding="utf-8") as file:
         file.write("\nω = 3\n\nclass Ünit:\n    größe = ω\n")
-    bare = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "FMU_PYTHON_PROCESS": place}
+    bare: dict[str, Any] = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "FMU_PYTHON_PROCESS": place}
     if place == "1":
         bare["FMU_LIBPYTHON"] = "/no/libpython.so"
     expect_values(run(unpacked, resources=resources, **bare))
