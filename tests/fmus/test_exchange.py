@@ -48,6 +48,9 @@ def test_bytes_of_another_type_or_without_room_are_refused():
     for value in ("text", bytearray(b"x"), None, bytes(1 << 17)):
         with pytest.raises(InvalidOutput, match="note_back"):
             write(eye.Eye, y, note_back=value)
+    for picture in (np.zeros((720, 1280, 3)), np.zeros((720, 1280, 1), np.uint8), [0]):
+        with pytest.raises(InvalidOutput, match=r"uint8 array of shape \(720, 1280, 3\)"):
+            write(eye.Eye, y, brighter=picture)
 
 
 def test_what_are_no_outputs_is_refused_with_what_would_be(wording: Wording):
