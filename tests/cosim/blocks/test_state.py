@@ -1,6 +1,8 @@
 import enum
+import math
 import struct
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple, cast
@@ -9,9 +11,10 @@ import hypothesis.strategies as st
 import msgpack
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis.extra import numpy as arrays
 from support.cosim.planted import CodeThatRuns, planted_pickle
+from support.wording import Wording
 
 from handover.cosim.blocks.block import InvalidState
 from handover.cosim.blocks.start_values import fault_of, numbers_of, range_of
@@ -47,27 +50,29 @@ def kinds(state: Any) -> Any:
 
 
 @given(PLAIN)
+@settings(max_examples=40)
 def test_plain_data_comes_back_type_for_type(state: Any):
     again = unpack_state(pack_state(state))
     assert again == state
     assert kinds(again) == kinds(state)
 
 
-@given(st.floats(width=64))
-def test_a_float_keeps_its_bits(x: float):
-    assert struct.pack("<d", unpack_state(pack_state(x))) == struct.pack("<d", x)
-
-
-def test_a_nan_keeps_its_payload():
+def test_numbers_keep_their_bits_and_types():
     nan = struct.unpack("<d", (0x7FF8_0000_DEAD_BEEF).to_bytes(8, "little"))[0]
-    assert struct.pack("<d", unpack_state(pack_state(nan))) == struct.pack("<d", nan)
+    for x in (0.0, -0.0, 0.1, math.inf, -math.inf, 5e-324, nan):
+        assert struct.pack("<d", unpack_state(pack_state(x))) == struct.pack("<d", x)
     array = np.frombuffer((0xFFF8_0000_0000_0001).to_bytes(8, "little"))
     assert unpack_state(pack_state(array)).tobytes() == array.tobytes()
+    for number in (np.float64(0.1), np.float32(0.1), np.int64(-3), np.bool_(True), np.str_("a")):
+        again = unpack_state(pack_state([number]))[0]
+        assert type(again) is type(number)
+        assert again == number
 
 
 @given(
     arrays.arrays(arrays.scalar_dtypes().filter(lambda d: d.kind in "biufcSU" and d.itemsize), arrays.array_shapes())
 )
+@settings(max_examples=40)
 def test_an_array_keeps_type_shape_and_bytes(array: Any):
     again = unpack_state(pack_state(array))
     assert (again.dtype, again.shape, again.tobytes()) == (array.dtype, array.shape, array.tobytes())
@@ -83,13 +88,6 @@ def test_an_array_keeps_its_order_in_memory():
         assert again.shape == array.shape
         assert again.flags.fnc == array.flags.fnc
     assert unpack_state(pack_state(columns)).flags.fnc
-
-
-def test_a_number_of_numpy_stays_one():
-    for number in (np.float64(0.1), np.float32(0.1), np.int64(-3), np.bool_(True), np.str_("a")):
-        again = unpack_state(pack_state([number]))[0]
-        assert type(again) is type(number)
-        assert again == number
 
 
 @pytest.mark.parametrize("generator", [np.random.PCG64, np.random.MT19937, np.random.Philox, np.random.SFC64])
@@ -129,28 +127,24 @@ class Item:
 RECORDS = (Item, Pair, Colour)
 
 
-def test_records_come_back_for_a_reader_that_names_them():
+def test_records_come_back_for_a_reader_that_names_them_through_their_constructor(wording: Wording):
     item = Item(Colour.RED, Pair(1.0, (2, 3)))
     item.seen.append(4.0)
     again = unpack_state(pack_state({"items": [item]}, RECORDS), RECORDS)["items"][0]
     assert again == item
     assert again.seen == [4.0]
-    with pytest.raises(InvalidState, match="holds a 'Colour RED', and none"):
-        unpack_state(pack_state(item, RECORDS))
-    with pytest.raises(InvalidState, match="holds a 'Pair', and none"):
-        unpack_state(pack_state(item.pair, RECORDS))
-    with pytest.raises(InvalidState, match="holds a 'Colour'; valid are Item, Pair"):
-        unpack_state(pack_state(item, RECORDS), (Item, Pair))
-
-
-def test_the_constructor_of_a_record_checks_it():
     packed = pack_state(Item(Colour.RED, Pair(1.0, ())), RECORDS)
-    with pytest.raises(InvalidState, match="ValueError: a is below 0"):
-        unpack_state(packed.replace(struct.pack(">d", 1.0), struct.pack(">d", -1.0)), RECORDS)
-    with pytest.raises(InvalidState, match="'colour', 'pair', 'seen'"):
-        unpack_state(packed.replace(b"pair", b"four"), RECORDS)
-    with pytest.raises(InvalidState, match="KeyError: 'RID'"):
-        unpack_state(packed.replace(b"RED", b"RID"), RECORDS)
+    for content, known in (
+        (packed, ()),
+        (pack_state(item.pair, RECORDS), ()),
+        (packed, (Item, Pair)),
+        (packed.replace(struct.pack(">d", 1.0), struct.pack(">d", -1.0)), RECORDS),
+        (packed.replace(b"pair", b"four"), RECORDS),
+        (packed.replace(b"RED", b"RID"), RECORDS),
+    ):
+        with pytest.raises(InvalidState) as refused:
+            unpack_state(content, known)
+        wording.check(refused.value)
 
 
 @pytest.mark.parametrize(
@@ -197,6 +191,7 @@ def ext(code: int, content: bytes) -> bytes:
         (ext(7, b"1/0"), "ZeroDivisionError"),
         (ext(7, b"1e9"), "ValueError"),
         (ext(8, b"1"), "not a state"),
+        (pack_state(np.array(["abcd"]))[:-16] + b"\xff" * 16, "no characters"),
         (b"\x91" + ext(2, b""), "not a state"),
     ],
 )
@@ -208,17 +203,8 @@ def test_what_is_damaged_or_made_up_is_refused(packed: bytes, fault: str):
 
 @given(st.binary(max_size=300))
 def test_any_bytes_are_plain_data_or_refused(packed: bytes):
-    try:
-        state = unpack_state(packed)
-    except InvalidState:
-        return
-    kinds(state)
-
-
-def test_texts_of_what_are_no_characters_are_refused():
-    packed = pack_state(np.array(["abcd"]))
-    with pytest.raises(InvalidState, match="no characters"):
-        unpack_state(packed[:-16] + b"\xff" * 16)
+    with suppress(InvalidState):
+        kinds(unpack_state(packed))
 
 
 METRE = Unit("m", BaseExponents(m=1))
@@ -236,30 +222,25 @@ def variable(kind: Kind, **facts: Any) -> Variable:
 
 
 @pytest.mark.parametrize(
-    ("given", "value", "text"),
+    ("kind", "facts", "value"),
     [
-        (variable(Kind.REAL, unit=METRE, minimum=0.0, maximum=2.0), 2.5, "out of range: from 0 to 2 m"),
-        (variable(Kind.REAL, unit=METRE, minimum=0.0), -1, "at least 0 m"),
-        (variable(Kind.REAL, unit=METRE, maximum=0.0), 1, "at most 0 m"),
-        (variable(Kind.REAL, unit=METRE), "far", "'far' is not a number in m"),
-        (variable(Kind.REAL), float("nan"), "not finite"),
-        (variable(Kind.REAL, shape=(3,), unit=METRE), [1.0, 2.0], "an array of shape [3] of numbers in m"),
-        (variable(Kind.REAL, shape=(2,), minimum=0.0), [1.0, -2.0], "out of range"),
-        (variable(Kind.INTEGER), 1.5, "a whole number"),
-        (variable(Kind.BOOLEAN), "maybe", "neither true nor false"),
-        (variable(Kind.ENUMERATION), "behind", "none of front, left"),
-        (variable(Kind.ENUMERATION), 3, "none of 0 (front), 4 (left)"),
-        (variable(Kind.STRING), 5, "5 is not a string"),
+        (Kind.REAL, {"unit": METRE, "minimum": 0.0, "maximum": 2.0}, 2.5),
+        (Kind.REAL, {"unit": METRE, "minimum": 0.0}, -1),
+        (Kind.REAL, {"unit": METRE, "maximum": 0.0}, 1),
+        (Kind.REAL, {"unit": METRE}, "far"),
+        (Kind.REAL, {"unit": Unit("")}, "far"),
+        (Kind.REAL, {}, float("nan")),
+        (Kind.REAL, {"shape": (3,), "unit": METRE}, [1.0, 2.0]),
+        (Kind.REAL, {"shape": (2,), "minimum": 0.0}, [1.0, -2.0]),
+        (Kind.INTEGER, {}, 1.5),
+        (Kind.BOOLEAN, {}, "maybe"),
+        (Kind.ENUMERATION, {}, "behind"),
+        (Kind.ENUMERATION, {}, 3),
+        (Kind.STRING, {}, 5),
     ],
 )
-def test_a_bad_value_is_reported_with_valid_values(given: Variable, value: Any, text: str):
-    fault = fault_of(given, value)
-    assert fault is not None
-    assert text in fault
-
-
-def test_a_port_whose_unit_has_no_name_is_of_numbers():
-    assert fault_of(variable(Kind.REAL, unit=Unit("")), "far") == "'far' is not a number"
+def test_a_bad_value_is_reported_with_valid_values(kind: Kind, facts: dict[str, Any], value: Any, wording: Wording):
+    wording.check(fault_of(variable(kind, **facts), value))
 
 
 @pytest.mark.parametrize(
@@ -277,10 +258,8 @@ def test_a_good_value_has_no_fault(given: Variable, value: Any):
     assert fault_of(given, value) is None
 
 
-def test_numbers_come_in_row_major_order():
+def test_numbers_come_in_row_major_order_and_large_ones_keep_their_digits():
     assert numbers_of(variable(Kind.REAL, shape=(2, 2)), [[1, 2], [3, 4]]).tolist() == [1, 2, 3, 4]
     assert numbers_of(variable(Kind.ENUMERATION), "Left").tolist() == [4]
-
-
-def test_no_range_is_reported_where_there_is_none():
+    assert numbers_of(variable(Kind.INTEGER), 2**53 + 1).tolist() == [2**53 + 1]
     assert range_of(variable(Kind.REAL)) == ""
