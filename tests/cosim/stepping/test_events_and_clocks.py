@@ -168,22 +168,21 @@ def test_a_message_arrives_at_each_tick_also_where_it_is_the_same_again(box: str
     assert {t: row[0] for t, row in rows.items()} == {k / 10: k + 1 for k in range(11)}
 
 
-def test_a_clock_of_parameters_has_its_interval():
+@pytest.mark.parametrize(
+    ("unit", "start", "ticks"),
+    [
+        ("metronome", {"beat": 0.3}, [3 * k / 10 for k in range(11)]),
+        ("pulses", {}, [k * (k + 1) / 20 for k in range(1, 8)]),
+    ],
+)
+def test_a_clock_of_parameters_or_one_that_changes_has_its_intervals(
+    unit: str, start: dict[str, float], ticks: list[float]
+):
     s = System()
-    s.add("metronome", native_fmu("metronome"), period=Fraction(1), beat=0.3)
-    rows = observed_rows(s, Fraction(3), "metronome.count")
-    ticks = {3 * k / 10: k + 1 for k in range(11)}
-    assert {t: row[0] for t, row in rows.items() if t not in (1.0, 2.0)} == ticks
-
-
-def test_a_changing_clock_gives_its_next_interval_at_each_tick():
-    s = System()
-    s.add("pulses", native_fmu("pulses"), period=Fraction(1))
-    rows = observed_rows(s, Fraction(3), "pulses.count")
-    ticks = [k * (k + 1) / 20 for k in range(1, 8)]
-    off_grid = [t for t in rows if t not in (0.0, 2.0, 3.0)]
-    assert off_grid == pytest.approx(ticks, abs=1e-15)
-    assert all(row[0] == sum(tick <= t + 1e-12 for tick in ticks) for t, row in rows.items())
+    s.add("unit", native_fmu(unit), period=Fraction(1), **start)
+    rows = observed_rows(s, Fraction(3), "unit.count")
+    assert list(rows) == pytest.approx(sorted({*ticks, 0.0, 1.0, 2.0, 3.0}), abs=1e-15)
+    assert all(count == sum(tick <= t + 1e-12 for tick in ticks) for t, (count,) in rows.items())
 
 
 def test_a_countdown_begins_when_something_happens():

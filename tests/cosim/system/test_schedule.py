@@ -1,11 +1,13 @@
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import networkx as nx
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.wording import Wording
 
 from handover.cosim.blocks.variable import Causality, Kind
 from handover.cosim.exceptions import ScheduleError
@@ -14,85 +16,69 @@ from handover.cosim.system.ordering import ordered, strongly_connected
 from handover.cosim.system.schedule import Schedule
 from handover.cosim.system.system import PlacedUnit, PortName, System
 
+FEEDTHROUGH = {"y": ("u",)}
+NOTHING: dict[str, Any] = {key: {} for key in ("parameters", "feedthrough", "presumed_feedthrough")}
 
-def description(feedthrough: bool, presumed: bool, sampled: bool) -> FmuDescription:
-    def ports(causality: Causality, *names: str) -> dict[str, FmuPort]:
-        made = [
-            FmuPort(name=n, kind=Kind.REAL, causality=causality, fmi_type="Float64", references=(0,)) for n in names
-        ]
-        return {p.name: p for p in made}
 
-    return FmuDescription(
-        path=Path("none.fmu"),
-        fmi=3,
-        name="None",
-        identifier="None",
-        token="",
-        step=None,
-        parameters={},
-        inputs=ports(Causality.INPUT, "u"),
-        outputs=ports(Causality.OUTPUT, "y"),
-        feedthrough={"y": ("u",)} if feedthrough else {},
-        presumed_feedthrough={"y": ("u",)} if presumed else {},
-        sampled=sampled,
+def described(**facts: Any) -> FmuDescription:
+    """Return a unit of one input u and one output y."""
+    u, y = (
+        FmuPort(name=name, kind=Kind.REAL, causality=causality, fmi_type="Float64", references=(0,))
+        for name, causality in (("u", Causality.INPUT), ("y", Causality.OUTPUT))
     )
+    none: dict[str, Any] = {"path": Path("none.fmu"), "fmi": 3, "name": "None", "identifier": "None", "token": ""}
+    given = {**none, **NOTHING, "step": None, "inputs": {"u": u}, "outputs": {"y": y}, "sampled": False, **facts}
+    return FmuDescription(**given)
 
 
-def system(
-    direct: str = "", plain: str = "", presumed: str = "", sampled: str = "", period: Fraction = Fraction(1, 10)
-) -> System:
+def system(*pairs: str, period: Fraction = Fraction(1, 10), **units: str) -> System:
+    """Return units with direct feedthrough, plain, presumed or sampled ones, connected as in `a>b`."""
+    kinds: dict[str, dict[str, Any]] = {
+        "direct": {"feedthrough": FEEDTHROUGH},
+        "plain": {},
+        "presumed": {"presumed_feedthrough": FEEDTHROUGH},
+        "sampled": {"feedthrough": FEEDTHROUGH, "sampled": True},
+    }
     s = System()
-    for names, facts in (
-        (direct, (True, False, False)),
-        (plain, (False, False, False)),
-        (presumed, (False, True, False)),
-        (sampled, (True, False, True)),
-    ):
+    for kind, names in units.items():
         for name in names.split():
-            d = description(*facts)
-            s.units[name] = PlacedUnit(name, d, {}, period, d.sampled)
+            s.units[name] = PlacedUnit(name, described(**kinds[kind]), {}, period, kind == "sampled")
+    for a, b in (pair.split(">") for pair in pairs):
+        s.connect(PortName(a, "y"), PortName(b, "u"))
     return s
 
 
-def connect(s: System, *pairs: str) -> None:
-    for pair in pairs:
-        a, b = pair.split(">")
-        s.connect(PortName(a, "y"), PortName(b, "u"))
-
-
-def test_a_chain_of_feedthrough_is_ordered_from_its_source():
-    s = system("c b a", plain="plant")
-    connect(s, "plant>a", "a>b", "b>c", "c>plant")
-    assert [x.unit for x in Schedule(s).continuous] == ["plant", "a", "b", "c"]
-
-
-def test_sampled_units_stand_apart_and_after_their_sources():
-    s = system(plain="plant", sampled="servo vision camera")
-    connect(s, "plant>camera", "camera>vision", "vision>servo", "servo>plant")
+@pytest.mark.parametrize(
+    ("s", "sampled", "continuous"),
+    [
+        pytest.param(
+            system("plant>a", "a>b", "b>c", "c>plant", direct="c b a", plain="plant"), "", "plant a b c", id="chain"
+        ),
+        pytest.param(
+            system("plant>eye", "eye>see", "see>servo", "servo>plant", plain="plant", sampled="servo see eye"),
+            "eye see servo",
+            "plant",
+            id="sampled units stand apart",
+        ),
+        pytest.param(system("a>b", presumed="b a"), "", "a b", id="presumed feedthrough orders"),
+        pytest.param(system(direct="z y x", plain="n m"), "", "z y x n m", id="no dependencies, kept order"),
+        pytest.param(system("a>p", "p>a", direct="a", plain="p"), "", "p a", id="no loop through a plant"),
+    ],
+)
+def test_units_come_after_those_that_they_depend_on(s: System, sampled: str, continuous: str):
     schedule = Schedule(s)
-    assert [x.unit for x in schedule.sampled] == ["camera", "vision", "servo"]
-    assert [x.unit for x in schedule.continuous] == ["plant"]
+    assert [x.unit for x in schedule.sampled] == sampled.split()
+    assert [x.unit for x in schedule.continuous] == continuous.split()
+    assert not schedule.loops
 
 
-def test_presumed_feedthrough_orders_but_does_not_make_a_loop(caplog: pytest.LogCaptureFixture):
-    chain = system(presumed="b a")
-    connect(chain, "a>b")
-    assert [x.unit for x in Schedule(chain).slots] == ["a", "b"]
-    loop = system(presumed="a b")
-    connect(loop, "a>b", "b>a")
-    assert [x.unit for x in Schedule(loop).slots] == ["a", "b"]
+def test_presumed_feedthrough_does_not_make_a_loop(caplog: pytest.LogCaptureFixture):
+    assert [x.unit for x in Schedule(system("a>b", "b>a", presumed="a b")).slots] == ["a", "b"]
     assert "a does not declare its direct feedthrough" in caplog.text
 
 
-def test_units_that_do_not_depend_on_each_other_keep_their_order():
-    s = system("z y x", plain="n m")
-    assert [x.unit for x in Schedule(s).slots] == ["z", "y", "x", "n", "m"]
-
-
 def test_units_of_a_loop_stand_together_between_those_before_and_after():
-    s = system("after b c a", plain="plant")
-    connect(s, "a>b", "b>c", "c>a", "b>after")
-    schedule = Schedule(s)
+    schedule = Schedule(system("a>b", "b>c", "c>a", "b>after", direct="after b c a", plain="plant"))
     assert schedule.loops
     assert [g.units for g in schedule.groups] == [("b", "c", "a"), ("after",), ("plant",)]
     assert schedule.groups[0].message.startswith("b.y -> c.u, c.u feeds through to c.y, c.y -> a.u")
@@ -102,12 +88,9 @@ def test_units_of_a_loop_stand_together_between_those_before_and_after():
 
 
 def test_loops_that_share_a_unit_are_one_group():
-    s = system("a b c")
-    d = description(feedthrough=True, presumed=False, sampled=False)
-    inputs = {n: replace(d.inputs["u"], name=n) for n in ("u", "w")}
-    two = replace(d, inputs=inputs, feedthrough={"y": ("u", "w")})
-    s.units["b"] = replace(s.units["b"], description=two)
-    connect(s, "a>b", "b>a", "b>c")
+    s = system("a>b", "b>a", "b>c", direct="a b c")
+    inputs = {n: replace(s.units["b"].description.inputs["u"], name=n) for n in ("u", "w")}
+    s.units["b"] = replace(s.units["b"], description=described(inputs=inputs, feedthrough={"y": ("u", "w")}))
     s.connect(PortName("c", "y"), PortName("b", "w"))
     (group,) = Schedule(s).groups
     assert set(group.units) == {"a", "b", "c"}
@@ -115,85 +98,45 @@ def test_loops_that_share_a_unit_are_one_group():
     assert "(and 2 more connections between these outputs and inputs)" in group.message
 
 
-def test_a_loop_through_a_plant_is_no_algebraic_loop():
-    s = system("controller", plain="plant")
-    connect(s, "controller>plant", "plant>controller")
-    assert [x.unit for x in Schedule(s).slots] == ["plant", "controller"]
-
-
-def test_the_tick_divides_all_periods_exactly():
-    s = system("a", period=Fraction(1, 30))
+def test_the_tick_divides_all_periods_exactly_and_time_does_not_drift(wording: Wording):
+    s = system(direct="a", period=Fraction(1, 30))
     s.units |= system(plain="b", period=Fraction(1, 50)).units
     schedule = Schedule(s)
     assert schedule.tick == Fraction(1, 150)
     assert {x.unit: x.every for x in schedule.slots} == {"a": 5, "b": 3}
-
-
-def test_time_does_not_drift():
-    schedule = Schedule(system("a", period=Fraction(1, 10)))
+    schedule = Schedule(system(direct="a"))
     assert schedule.time(3) == 0.3
     assert schedule.time(10**9) == 1e8
     assert schedule.ticks(Fraction(1, 3)) == 4
-
-
-def test_steps_that_fit_no_common_grid_are_refused():
-    s = system("a", period=Fraction(33333, 999991))
-    s.units |= system(plain="b", period=Fraction(1, 50)).units
-    with pytest.raises(ScheduleError, match="a 33333/999991 s, b 1/50 s"):
+    s.units |= system(direct="a", period=Fraction(33333, 999991)).units
+    with pytest.raises(ScheduleError) as refused:
         Schedule(s)
+    wording.check(refused.value)
 
 
-class DescribeWait:
-    def __init__(self) -> None:
-        self.soft: list[tuple[str, set[str]]] = []
-        self.firm: list[tuple[str, set[str]]] = []
-
-    def order(self, firm: dict[str, str], soft: dict[str, str] | None = None) -> str:
-        def of_soft(name: str, waits: set[str]) -> None:
-            self.soft.append((name, set(waits)))
-
-        def of_firm(name: str, waits: set[str]) -> None:
-            self.firm.append((name, set(waits)))
-
-        return "".join(ordered(firm, soft or {}, of_soft, of_firm))
-
-
-def test_things_keep_their_order_where_nothing_is_needed():
-    assert DescribeWait().order({"c": "", "a": "", "b": ""}) == "cab"
-
-
-def test_each_follows_what_it_needs_firmly_or_not():
-    assert DescribeWait().order({"a": "b", "b": "c", "c": ""}) == "cba"
-    assert DescribeWait().order({"a": "", "b": "", "c": ""}, {"a": "b", "b": "c"}) == "cba"
-
-
-def test_a_soft_need_gives_way_before_a_firm_one():
-    value = DescribeWait()
-    assert value.order({"a": "b", "b": ""}, {"b": "a"}) == "ba"
-    assert value.soft == [("b", {"a"})]
-    assert value.firm == []
-
-
-def test_a_cycle_of_firm_needs_opens_where_nothing_else_holds_it_up():
-    value = DescribeWait()
-    assert value.order({"after": "b", "b": "c", "c": "b"}) == "b" + "after" + "c"
-    assert value.firm == [("b", {"c"})]
-    assert value.soft == []
-
-
-def test_what_needs_itself_softly_is_reported():
-    value = DescribeWait()
-    assert value.order({"a": ""}, {"a": "a"}) == "a"
-    assert value.soft == [("a", {"a"})]
-
-
-def test_those_that_need_each_other_are_together_in_the_order_given():
-    sets = strongly_connected({"d": "c", "c": "b", "b": "c", "a": "x"})
-    assert sorted(map("".join, sets)) == ["a", "cb", "d"]
-    assert strongly_connected({}) == []
+@pytest.mark.parametrize(
+    ("firm", "soft", "order", "soft_waits", "firm_waits"),
+    [
+        pytest.param({"c": "", "a": "", "b": ""}, {}, "cab", [], [], id="nothing is needed"),
+        pytest.param({"a": "b", "b": "c", "c": ""}, {}, "cba", [], [], id="firmly"),
+        pytest.param({"a": "", "b": "", "c": ""}, {"a": "b", "b": "c"}, "cba", [], [], id="softly"),
+        pytest.param({"a": "b", "b": ""}, {"b": "a"}, "ba", [("b", {"a"})], [], id="a soft need gives way first"),
+        pytest.param(
+            {"after": "b", "b": "c", "c": "b"}, {}, "bafterc", [], [("b", {"c"})], id="a cycle opens where it holds up"
+        ),
+        pytest.param({"a": ""}, {"a": "a"}, "a", [("a", {"a"})], [], id="needs itself"),
+    ],
+)
+def test_each_follows_what_it_needs(
+    firm: dict[str, str], soft: dict[str, str], order: str, soft_waits: list[Any], firm_waits: list[Any]
+):
+    softly, firmly = list[Any](), list[Any]()
+    found = ordered(firm, soft, lambda n, w: softly.append((n, {*w})), lambda n, w: firmly.append((n, {*w})))
+    assert ("".join(found), softly, firmly) == (order, soft_waits, firm_waits)
 
 
 @given(st.dictionaries(st.integers(0, 11), st.lists(st.integers(0, 13), max_size=4), max_size=12))
+@settings(max_examples=50)
 def test_those_that_need_each_other_are_the_components_that_networkx_finds(needs: dict[int, list[int]]):
     graph = nx.DiGraph([(a, b) for a, others in needs.items() for b in others if b in needs])
     graph.add_nodes_from(needs)

@@ -1,123 +1,88 @@
-from collections.abc import Callable
+"""What is wrong with a system is found before anything starts, all at once."""
+
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 import pytest
+from support.cosim.fmu_of import FmuOf
 from support.cosim.native_units import Edited, native_fmu
+from support.wording import Wording
 
-from handover.cosim.blocks.start_values import numbers_of
 from handover.cosim.blocks.units import UNKNOWN, BaseExponents, Unit
-from handover.cosim.blocks.variable import Causality, Kind, Variable
-from handover.cosim.exceptions import InvalidFmu, WiringError
+from handover.cosim.blocks.variable import Causality, Kind
+from handover.cosim.exceptions import InvalidFmu, NotExportable, WiringError
 from handover.cosim.fmu.file.default_experiment import proposed_step
-from handover.cosim.fmu.file.description import FmuPort
+from handover.cosim.fmu.file.description import FmuPort, describe_fmu
+from handover.cosim.master.master import Master
+from handover.cosim.ssp.writing import write_ssp
 from handover.cosim.system.system import PortName, System
 from handover.cosim.system.wiring_faults import doubt, mismatch, obstacle
 
 M, NM = BaseExponents(m=1), BaseExponents(kg=1, m=2, s=-2)
 
-FmuOf = Callable[..., Path]
+
+def faults_of(s: System) -> tuple[str, ...]:
+    with pytest.raises(WiringError) as refused:
+        Master(s)
+    return refused.value.faults
 
 
-def faults_of(system: System) -> tuple[str, ...]:
-    with pytest.raises(WiringError) as caught:
-        system.check()
-    return caught.value.faults
-
-
-def test_a_sound_system_passes(fmu: FmuOf):
-    s = System()
-    mass, spring = s.add("mass", fmu("Mass"), m=2.0), s.add("spring", fmu("Spring"))
-    s.connect(mass.y.x, spring.u.x)
-    s.connect(spring.y.f, mass.u.f)
-    s.check()
-
-
-def test_units_and_kinds_and_shapes_must_agree(fmu: FmuOf):
-    s = System()
-    mass, counter, echo = s.add("mass", fmu("Mass")), s.add("counter", fmu("Counter")), s.add("echo", fmu("Echo"))
-    s.connect(mass.y.x, mass.u.f)
-    s.connect(counter.y.at, echo.u.n)
-    s.connect(counter.y.at, echo.u.pair)
-    unit, kind, shape = faults_of(s)
-    assert unit == "mass.x (real m) -> mass.f (real N): their units differ in dimension"
-    assert kind == "counter.at (real) -> echo.n (integer): real cannot feed integer"
-    assert shape == "counter.at (real) -> echo.pair (real [2]): their shapes differ"
-
-
-def test_unknown_names_are_reported_with_the_nearest_valid_ones(fmu: FmuOf):
-    s = System()
-    mass, spring = s.add("mass", fmu("Mass"), mas=1.0), s.add("spring", fmu("Spring"))
-    s.connect(mass.y.xx, spring.u.x)
-    s.connect(mass.y.x, spring.u.stretch)
-    s.connect(mass.u.f, spring.u.x)
-    s.connect(mass.y.x, spring.y.f)
-    text = "\n".join(faults_of(s))
-    assert "mass has no parameter or input 'mas'; did you mean m" in text
-    assert "mass has no output 'xx'; did you mean x?" in text
-    assert "spring has no input 'stretch'; valid: x" in text
-    assert "mass.f is an input, not an output" in text
-    assert "spring.f is an output, not an input" in text
-
-
-def test_a_connection_to_a_unit_that_is_not_there_is_reported(fmu: FmuOf):
+def test_all_faults_are_reported_at_once_with_what_is_valid(fmu: FmuOf, wording: Wording):
     s, other = System(), System()
-    s.add("spring", fmu("Spring"))
-    spring = other.add("sprint", fmu("Spring"))
-    s.connect(spring.y.f, spring.u.x)
-    text = "\n".join(faults_of(s))
-    assert "there is no unit 'sprint'; did you mean spring?" in text
+    mass, spring = s.add("mass", fmu("Mass"), mas=1.0, m=-1.0), s.add("spring", fmu("Spring"), k="stiff")
+    counter, echo = s.add("counter", fmu("Counter")), s.add("echo", fmu("Echo"))
+    s.add("twice", fmu("Mass"), m=-1.0)
+    s.add("twice", fmu("Mass"), period=Fraction(0))  # takes its place, and is what is wrong
+    for source, target in (
+        (mass.y.x, mass.u.f),  # units
+        (counter.y.at, echo.u.n),  # kinds
+        (counter.y.at, echo.u.pair),  # shapes
+        (mass.y.xx, spring.u.x),  # names
+        (mass.y.x, spring.u.stretch),
+        (mass.u.f, spring.u.x),  # ends
+        (mass.y.x, spring.y.f),
+        (other.add("sprint", fmu("Spring")).y.f, spring.u.x),
+    ):
+        s.connect(source, target)
+    faults = faults_of(s)
+    assert not any("twice.m" in fault for fault in faults)
+    wording.check("\n".join(faults))
 
 
 def test_an_input_is_fed_once(fmu: FmuOf):
     s = System()
     a, b, spring = s.add("a", fmu("Mass")), s.add("b", fmu("Mass")), s.add("spring", fmu("Spring"))
     s.connect(a.y.x, spring.u.x)
+    s.check()
     s.connect(b.y.x, spring.u.x)
     assert faults_of(s) == ("spring.x is fed twice: by a.x and by b.x",)
 
 
-def test_values_out_of_range_or_of_the_wrong_kind_are_reported(fmu: FmuOf):
-    s = System()
-    s.add("a", fmu("Mass"), m=-1.0)
-    s.add("b", fmu("Mass"), m="heavy")
-    s.add("a", fmu("Mass"), period=Fraction(0))
-    text = "\n".join(faults_of(s))
-    assert "a.m" not in text  # the second a took its place, and is what is wrong
-    assert "b.m: 'heavy' is not a number in kg" in text
-    assert "two units are called 'a'" in text
-    assert "give one that is above 0 s" in text
-
-
-def test_range_faults_name_the_range(fmu: FmuOf):
-    s = System()
-    s.add("a", fmu("Mass"), m=-1.0)
-    assert faults_of(s) == ("a.m: -1.0 is out of range: from 0.001 to 100 kg",)
-
-
-@pytest.mark.parametrize(
-    ("content", "text"),
-    [(None, "no such file"), (b"no zip", "not an FMU"), (b"", "not an FMU")],
-)
-def test_a_file_that_is_no_fmu_is_refused(tmp_path: Path, content: bytes | None, text: str):
+@pytest.mark.parametrize("content", [None, b"no zip", b""])
+def test_a_file_that_is_no_fmu_is_refused(tmp_path: Path, content: bytes | None, wording: Wording):
     file = tmp_path / "some.fmu"
     if content is not None:
         file.write_bytes(content)
-    with pytest.raises(InvalidFmu, match=text):
+    with pytest.raises(InvalidFmu) as refused:
         System().add("x", file)
+    wording.check(refused.value)
 
 
-def test_both_standards_describe_a_unit_alike(fmu: FmuOf):
-    s = System()
-    for name in ("Mass", "Spring"):
-        a, b = (s.add(f"{name}{v}", fmu(name, v)).description for v in (2, 3))
-        for x, y in ((a.inputs, b.inputs), (a.outputs, b.outputs), (a.parameters, b.parameters)):
-            assert list(x) == list(y)
-            assert [(p.name, p.signature, p.minimum, p.maximum) for p in x.values()] == [
-                (p.name, p.signature, p.minimum, p.maximum) for p in y.values()
-            ]
-        assert a.feedthrough == b.feedthrough
+@pytest.mark.parametrize("name", ["Mass", "Spring"])
+def test_both_standards_describe_a_unit_alike(fmu: FmuOf, name: str):
+    a, b = (System().add("unit", fmu(name, fmi)).description for fmi in (2, 3))
+    for x, y in ((a.inputs, b.inputs), (a.outputs, b.outputs), (a.parameters, b.parameters)):
+        assert list(x) == list(y)
+        assert [(p.name, p.signature, p.minimum, p.maximum) for p in x.values()] == [
+            (p.name, p.signature, p.minimum, p.maximum) for p in y.values()
+        ]
+    assert a.feedthrough == b.feedthrough
+
+
+def ends(*facts: dict[str, Any]) -> list[FmuPort]:
+    given: dict[str, Any] = {"name": "x", "kind": Kind.REAL, "causality": Causality.OUTPUT, "fmi_type": ""}
+    return [FmuPort(**{**given, "references": (1,), **each}) for each in facts]
 
 
 @pytest.mark.parametrize(
@@ -133,10 +98,7 @@ def test_both_standards_describe_a_unit_alike(fmu: FmuOf):
     ],
 )
 def test_units_are_compared_by_what_they_mean(a: Unit, b: Unit, fault: str | None):
-    output, target = (
-        FmuPort(name="x", kind=Kind.REAL, causality=Causality.OUTPUT, fmi_type="Float64", references=(1,), unit=u)
-        for u in (a, b)
-    )
+    output, target = ends({"unit": a}, {"unit": b})
     found = mismatch(output, target)
     assert (found is None) if fault is None else (found is not None and fault in found)
     assert (doubt(output, target) is not None) == (a.symbol == "furlong")  # else it can be connected, or cannot
@@ -152,12 +114,9 @@ def test_units_are_compared_by_what_they_mean(a: Unit, b: Unit, fault: str | Non
         ((Kind.BINARY, (2,)), (Kind.BINARY, ()), False),
         ((Kind.REAL, (1,)), (Kind.INTEGER, ()), False),
     ],
-)  # fmt: skip
+)
 def test_what_holds_the_same_values_can_be_connected_with_a_line(a: Any, b: Any, is_connected: bool):
-    output, target = (
-        FmuPort(name="x", kind=kind, shape=shape, causality=Causality.OUTPUT, fmi_type="", references=(1,))
-        for kind, shape in (a, b)
-    )
+    output, target = ends(*({"kind": kind, "shape": shape} for kind, shape in (a, b)))
     assert mismatch(output, target) is not None
     assert (obstacle(output, target) is None) is is_connected
     assert not is_connected or doubt(output, target)
@@ -171,36 +130,18 @@ def test_a_proposed_step_is_taken_as_it_is_meant(text: float, meant: Fraction):
     assert proposed_step(text) == meant
 
 
-def test_large_integers_keep_their_digits():
-    seed = Variable(name="seed", kind=Kind.INTEGER, causality=Causality.PARAMETER, start=0)
-    assert numbers_of(seed, 2**53 + 1).tolist() == [2**53 + 1]
-
-
-def test_a_port_is_distinguished_from_a_name(fmu: FmuOf):
+def test_a_port_is_no_name_and_a_period_is_exact(fmu: FmuOf, wording: Wording):
     s = System()
     mass = s.add("mass", str(fmu("Mass")))
-    wrong: Any = "mass.x"
-    with pytest.raises(TypeError, match=r"'mass\.x' is not a port: give unit\.y\.NAME"):
-        s.connect(wrong, mass.u.f)
-    assert not s.connections
-
-
-def test_a_period_must_be_exact_and_above_0(fmu: FmuOf):
-    s = System()
+    name: Any = "mass.x"
     inexact: Any = 0.01
-    with pytest.raises(TypeError, match=r"mass: period = 0\.01 is not exact.*give Fraction\('1/100'\)"):
+    with pytest.raises(TypeError) as refused:
+        s.connect(name, mass.u.f)
+    wording.check(refused.value)
+    assert not s.connections
+    with pytest.raises(TypeError) as refused:
         s.add("mass", fmu("Mass"), period=inexact)
-    s.add("mass", fmu("Mass"), period=Fraction(0))
-    assert faults_of(s) == ("mass: its communication step is 0 s; give one that is above 0 s",)
-
-
-def test_all_units_get_one_step():
-    s = System()
-    s.add("slow", native_fmu("gain", 2), period=Fraction(1, 3))
-    s.add("own", native_fmu("gain", 3))
-    s.set_step(Fraction(1, 500))
-    assert {u.period for u in s.units.values()} == {Fraction(1, 500)}
-    s.check()
+    wording.check(refused.value)
 
 
 def test_a_port_whose_name_is_no_identifier_is_named_by_key(edited: Edited):
@@ -211,3 +152,41 @@ def test_a_port_whose_name_is_no_identifier_is_named_by_key(edited: Edited):
     assert second.u["f"] == second.u.f
     system.connect(first.y["der(x) / a b"], second.u.f)
     assert any("first.der(x) / a b (real m)" in fault for fault in faults_of(system))  # m is no N
+
+
+def test_clocks_that_do_not_fit_are_reported(wording: Wording):
+    s = System()
+    a, b = s.add("a", native_fmu("counter_tenths")), s.add("b", native_fmu("counter_triggered"))
+    for source, target in ((a.y.count, b.u.tick), (a.y.carry, b.u.increment)):
+        s.connect(source, target)
+    s.connect(PortName("b", "tick"), PortName("a", "carry"))  # an output clock triggers an input clock
+    s.connect(b.y.carry, a.u.tick)  # which is time-based
+    faults = faults_of(s)
+    assert len(faults) == 4
+    wording.check("\n".join(faults))
+
+
+def test_clocked_ports_need_event_mode(wording: Wording):
+    s = System()
+    s.add("a", native_fmu("counter_tenths", hasEventMode=False))
+    s.add("b", native_fmu("counter_thirds"), sampled=True)
+    faults = faults_of(s)
+    assert len(faults) == 2
+    wording.check("\n".join(faults))
+
+
+def test_a_unit_with_clocked_ports_is_not_taken_for_a_sampled_one_nor_a_clock_that_never_ticks_for_one(edited: Edited):
+    d = describe_fmu(native_fmu("counter_tenths", canHandleVariableCommunicationStepSize=False))
+    assert not d.sampled
+    assert describe_fmu(native_fmu("discrete_passer", canHandleVariableCommunicationStepSize=False)).sampled
+    file = edited("counter_tenths", 3, ('intervalCounter="1"', 'intervalCounter="0"'))
+    with pytest.raises(InvalidFmu, match=r"its clock 'tick' ticks every 0 s from 0 s on"):
+        describe_fmu(file)
+
+
+def test_clock_connections_are_not_exported_silently(tmp_path: Path):
+    s = System()
+    a, b = s.add("a", native_fmu("counter_tenths")), s.add("b", native_fmu("counter_triggered"))
+    s.connect(a.y.carry, b.u.tick)
+    with pytest.raises(NotExportable, match=r"a.carry -> b.tick lets a clock tick"):
+        write_ssp(s, tmp_path / "clocks.ssp", "clocks")
