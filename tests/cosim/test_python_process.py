@@ -13,33 +13,23 @@ from handover.cosim.python_process import code_command, is_installed, module_com
 IMPORTED = "import json, sys; import handover.cosim; print(json.dumps([handover.cosim.__file__, *sys.argv[1:]]))"
 
 
-@pytest.fixture
-def other_copy(tmp_path: Path) -> Path:
-    """A folder with another package of the project's name, as a clone beside an installed one."""
-    for folder in ("handover", "handover/cosim"):
-        (tmp_path / folder).mkdir()
-        (tmp_path / folder / "__init__.py").write_text("", encoding="utf-8")
-    (tmp_path / "told.py").write_text(IMPORTED, encoding="utf-8")
-    return tmp_path
-
-
 def output_of(command: Sequence[str], where: Path) -> list[str]:
     return json.loads(subprocess.run(command, cwd=where, check=True, capture_output=True, text=True).stdout)
 
 
-def test_code_imports_what_this_process_does_wherever_it_is_called(other_copy: Path):
+def test_code_and_modules_import_what_this_process_does_wherever_they_are_called(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """Beside another package of the project's name, as a clone beside an installed one."""
     import handover.cosim
 
-    plainly = output_of([sys.executable, "-c", IMPORTED], other_copy)
-    assert plainly == [str(other_copy / "handover" / "cosim" / "__init__.py")], "what is guarded against"
-    assert output_of(code_command(IMPORTED, "a", "b c"), other_copy) == [handover.cosim.__file__, "a", "b c"]
-
-
-def test_so_does_a_module(other_copy: Path, monkeypatch: pytest.MonkeyPatch):
-    import handover.cosim
-
-    monkeypatch.setattr(sys, "path", [*sys.path, str(other_copy)])  # where it lies itself
-    assert output_of(module_command("told", "a", "{b}"), other_copy) == [handover.cosim.__file__, "a", "{b}"]
+    for folder in ("handover", "handover/cosim"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "__init__.py").write_text("", encoding="utf-8")
+    (tmp_path / "told.py").write_text(IMPORTED, encoding="utf-8")
+    assert output_of(code_command(IMPORTED, "a", "b c"), tmp_path) == [handover.cosim.__file__, "a", "b c"]
+    monkeypatch.setattr(sys, "path", [*sys.path, str(tmp_path)])  # where it lies itself
+    assert output_of(module_command("told", "a", "{b}"), tmp_path) == [handover.cosim.__file__, "a", "{b}"]
 
 
 PLANTED = ("json", "importlib", "secrets", "typing", "jinja2", "pandas", "starlette", "rich", "tomli", "numpy")
@@ -92,11 +82,6 @@ def test_folders_of_own_modules_come_last_and_only_where_one_is_named(planted: P
     assert not (planted / "run.txt").exists()
 
 
-def test_installed_is_what_lies_in_folders_of_this_interpreter(tmp_path: Path):
-    assert is_installed(Path(sysconfig.get_path("purelib"), "numpy", "__init__.py"))
-    assert not is_installed(tmp_path / "lib" / "python3.11" / "site-packages" / "numpy.py")
-
-
 def test_no_configuration_of_the_working_directory_is_read_by_a_library(tmp_path: Path):
     for name in ("matplotlibrc", ".numba_config.yaml"):
         (tmp_path / name).write_bytes(b"\xff: [")  # which fails where it is read
@@ -105,7 +90,9 @@ def test_no_configuration_of_the_working_directory_is_read_by_a_library(tmp_path
     assert json.loads(done.stdout or "[]") == [str(tmp_path.resolve())], done.stderr
 
 
-def test_that_ends_with_its_context():
+def test_installed_is_what_lies_in_folders_of_this_interpreter_and_that_ends_with_its_context(tmp_path: Path):
+    assert is_installed(Path(sysconfig.get_path("purelib"), "numpy", "__init__.py"))
+    assert not is_installed(tmp_path / "lib" / "python3.11" / "site-packages" / "numpy.py")
     before = list(sys.meta_path)
     with ImportedElsewhere.installed():
         assert ImportedElsewhere in sys.meta_path

@@ -1,7 +1,7 @@
 /* Units that answer discrete inputs in Event Mode.
  *
  * follower: count = count_in + 1, at most `most`, in the iteration after the one in which count_in came. watch: tells
- * when its input changed last. asker: asks for one more iteration for ever. quitter: ends the simulation in a step. staller: from 0.2 s on returns at once,
+ * when its input changed last. asker: asks for one more iteration for ever. staller: from 0.2 s on returns at once,
  * without getting on, as often as `most` says. pending: goes on by itself, as FMI 2 allows. */
 #include "frame/unit.h"
 
@@ -43,10 +43,6 @@ static enum status ask_at_end(Unit *unit, double t, double h, StepEnd *end) {
     end->event_needed = true;
     return OK;
 }
-static enum status quit(Unit *unit, double t, double h, StepEnd *end) {
-    end->terminate = t + h > 0.25;
-    return OK;
-}
 
 static enum status stall(Unit *unit, double t, double h, StepEnd *end) {
     SELF(Follower);
@@ -71,7 +67,6 @@ static const Model watch = {"watch", of_watch, COUNT(of_watch), 0.1, EVENTS, siz
 static const Model asker = {
     "asker", of_watch, COUNT(of_watch), 0.1, EVENTS, sizeof(Watch), .step = ask_at_end, .update = ask,
 };
-static const Model quitter = {"quitter", of_watch, COUNT(of_watch), 0.1, EVENTS, sizeof(Watch), .step = quit};
 static const Model staller = {
     "staller", of_follower, COUNT(of_follower), 0.1, EVENTS | EARLY_RETURN, sizeof(Follower),
     .step = stall, .update = count_stall,
@@ -80,6 +75,5 @@ static const Model pending = {"pending", of_watch, COUNT(of_watch), 0.1, 0, size
 UNIT(follower)
 UNIT(watch)
 UNIT(asker)
-UNIT(quitter)
 UNIT(staller)
 UNIT(pending)

@@ -21,14 +21,27 @@ class Light(enum.IntEnum):
     GREEN = 2
 
 
-class Stateless:
+class Plain:
+    """Without feedthrough and period of its own; all of it is its state."""
+
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}
     period: ClassVar[Fraction | None] = None
 
     def get_state(self) -> bytes:
-        return b""
+        return pickle.dumps(vars(self))
 
-    def set_state(self, state: bytes) -> None: ...
+    def set_state(self, state: bytes) -> None:
+        vars(self).update(pickle.loads(state))
+
+
+@dataclass(frozen=True, kw_only=True)
+class NoParams:
+    pass
+
+
+@dataclass(kw_only=True)
+class NoInputs:
+    pass
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,11 +61,8 @@ class MassOutputs:
     v: MetrePerSecond = output("speed")
 
 
-class Mass:
+class Mass(Plain):
     """Moves by m x'' = f, exactly for a force that is held over the step."""
-
-    feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}
-    period: ClassVar[Fraction | None] = None
 
     def __init__(self, params: MassParams) -> None:
         self.m, self.x, self.v = params.m, params.x_0, 0.0
@@ -65,12 +75,6 @@ class Mass:
         self.x += self.v * dt + a * dt * dt / 2
         self.v += a * dt
         return self.outputs(t + dt, u)
-
-    def get_state(self) -> bytes:
-        return pickle.dumps((self.x, self.v))
-
-    def set_state(self, state: bytes) -> None:
-        self.x, self.v = pickle.loads(state)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,7 +92,7 @@ class SpringOutputs:
     f: Newton = output("force")
 
 
-class Spring(Stateless):
+class Spring(Plain):
     """A spring, f = -k x, with direct feedthrough."""
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {"f": ("x",)}
@@ -108,9 +112,7 @@ class CounterParams:
     fails_at: int = parameter(10**6, "count at which it raises", minimum=1)
 
 
-@dataclass(kw_only=True)
-class CounterInputs:
-    pass
+CounterInputs = NoInputs
 
 
 @dataclass(kw_only=True)
@@ -123,11 +125,8 @@ class CounterOutputs:
     picture: TinyPicture = output("all pixels have the number as their value")
 
 
-class Counter:
+class Counter(Plain):
     """Counts its steps, with outputs of all kinds."""
-
-    feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}
-    period: ClassVar[Fraction | None] = None
 
     def __init__(self, params: CounterParams) -> None:
         self.fails_at, self.n = params.fails_at, 0
@@ -150,17 +149,6 @@ class Counter:
             raise RuntimeError(f"count {self.n} was asked to fail")
         return self.outputs(t + dt, u)
 
-    def get_state(self) -> bytes:
-        return pickle.dumps(self.n)
-
-    def set_state(self, state: bytes) -> None:
-        self.n = pickle.loads(state)
-
-
-@dataclass(frozen=True, kw_only=True)
-class EchoParams:
-    pass
-
 
 @dataclass(kw_only=True)
 class EchoInputs:
@@ -180,7 +168,7 @@ class EchoOutputs:
     brightness: Number = output("mean of the picture's pixels")
 
 
-class Echo(Stateless):
+class Echo(Plain):
     """Passes its input on, with direct feedthrough."""
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {
@@ -191,7 +179,7 @@ class Echo(Stateless):
         "brightness": ("picture",),
     }
 
-    def __init__(self, params: EchoParams) -> None: ...
+    def __init__(self, params: NoParams) -> None: ...
 
     def outputs(self, t: float, u: EchoInputs) -> EchoOutputs:  # noqa: ARG002
         return EchoOutputs(
@@ -256,11 +244,8 @@ class DiaryOutputs:
     pages: int = output("number of characters")
 
 
-class Diary:
+class Diary(Plain):
     """Writes down what it hears."""
-
-    feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}
-    period: ClassVar[Fraction | None] = None
 
     def __init__(self, params: DiaryParams) -> None:
         self.mark, self.text = params.mark, ""
@@ -271,12 +256,6 @@ class Diary:
     def step(self, t: float, dt: float, u: DiaryInputs) -> DiaryOutputs:
         self.text += f"{self.mark}{u.heard[-7:]}é"
         return self.outputs(t + dt, u)
-
-    def get_state(self) -> bytes:
-        return self.text.encode()
-
-    def set_state(self, state: bytes) -> None:
-        self.text = state.decode()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -301,11 +280,8 @@ class TallyOutputs:
     heard: Number = output("sum of the inputs")
 
 
-class Tally:
+class Tally(Plain):
     """Gives numbers of many widths that grow from step to step."""
-
-    feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}
-    period: ClassVar[Fraction | None] = None
 
     def __init__(self, params: TallyParams) -> None:
         self.factor, self.power, self.heard = params.factor, 1, 0.0
@@ -321,12 +297,6 @@ class Tally:
         self.heard = u.small + u.whole + u.single + u.double
         return self.outputs(t + dt, u)
 
-    def get_state(self) -> bytes:
-        return pickle.dumps((self.power, self.heard))
-
-    def set_state(self, state: bytes) -> None:
-        self.power, self.heard = pickle.loads(state)
-
 
 Photo = Annotated[NDArray[np.uint8], Raster(640, 480)]
 
@@ -336,13 +306,10 @@ class CameraOutputs:
     photo: Photo = output("pixels that differ, also from those of the step before")
 
 
-class Camera:
+class Camera(Plain):
     """Gives large pictures."""
 
-    feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}
-    period: ClassVar[Fraction | None] = None
-
-    def __init__(self, params: EchoParams) -> None:  # noqa: ARG002
+    def __init__(self, params: NoParams) -> None:  # noqa: ARG002
         self.n = 0
 
     def outputs(self, t: float, u: CounterInputs) -> CameraOutputs:  # noqa: ARG002
@@ -352,12 +319,6 @@ class Camera:
     def step(self, t: float, dt: float, u: CounterInputs) -> CameraOutputs:
         self.n += 1
         return self.outputs(t + dt, u)
-
-    def get_state(self) -> bytes:
-        return self.n.to_bytes(8, "little")
-
-    def set_state(self, state: bytes) -> None:
-        self.n = int.from_bytes(state, "little")
 
 
 @dataclass(kw_only=True)
@@ -370,16 +331,15 @@ class ViewerOutputs:
     weight: Number = output("the pixels, each times its place")
 
 
-class Viewer(Stateless):
+class Viewer(Plain):
     """Looks at every pixel of a large picture."""
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {"weight": ("photo",)}
 
-    def __init__(self, params: EchoParams) -> None:  # noqa: ARG002
-        self.places = np.arange(640 * 480 * 3, dtype=np.float64)
+    def __init__(self, params: NoParams) -> None: ...
 
     def outputs(self, t: float, u: ViewerInputs) -> ViewerOutputs:  # noqa: ARG002
-        return ViewerOutputs(weight=float(u.photo.ravel() @ self.places))
+        return ViewerOutputs(weight=float(u.photo.ravel() @ np.arange(640 * 480 * 3, dtype=np.float64)))
 
     def step(self, t: float, dt: float, u: ViewerInputs) -> ViewerOutputs:  # noqa: ARG002
         return self.outputs(t, u)

@@ -42,70 +42,52 @@ FMI3_TYPES = ("Float64", "Int32", "Boolean", "Binary", "Clock")
 FMI2_TYPES = ("Real", "Integer", "Boolean")
 
 
-def description2(d: Declaration, step: float, dependencies: bool, flags: Mapping[str, bool]) -> str:
-    assert not d.needs_fmi3, f"{d.name}: FMI 2 has no such variables"
-    root = ElementTree.Element(
-        "fmiModelDescription", fmiVersion="2.0", modelName=d.name, guid=d.name, variableNamingConvention="structured"
-    )
-    states = not d.abilities & NO_STATES
-    given = {
-        "canHandleVariableCommunicationStepSize": not d.abilities & FIXED_STEP,
-        "canInterpolateInputs": bool(d.abilities & INTERPOLATES),
-        "canGetAndSetFMUstate": states,
-        "canSerializeFMUstate": states,
-        "providesDirectionalDerivative": bool(d.abilities & DERIVATIVES),
-    }
-    ElementTree.SubElement(root, "CoSimulation", {"modelIdentifier": d.name, **_booleans({**given, **flags})})
+def description(d: Declaration, fmi: int, step: float, dependencies: bool, flags: Mapping[str, bool]) -> str:
+    assert fmi == 3 or not d.needs_fmi3, f"{d.name}: FMI 2 has no such variables"
+    token = {"guid" if fmi == 2 else "instantiationToken": d.name}
+    names = {"fmiVersion": f"{fmi}.0", "modelName": d.name, "variableNamingConvention": "structured", **token}
+    root = ElementTree.Element("fmiModelDescription", names)
+    given = {**_abilities(d, fmi), **flags}
+    ElementTree.SubElement(root, "CoSimulation", {"modelIdentifier": d.name, **_booleans(given)})
     _add_units(root, d)
     ElementTree.SubElement(root, "DefaultExperiment", startTime="0", stopTime="1", stepSize=repr(step))
     rows = ElementTree.SubElement(root, "ModelVariables")
+    if fmi == 3:
+        time = {"name": "time", "valueReference": "0", "causality": "independent", "variability": "continuous"}
+        ElementTree.SubElement(rows, "Float64", time)
     for v in d.variables:
-        ends = {"name": v.name, "valueReference": str(d.reference(v.name, fmi=2)), **_kind(d, v)}
-        row = ElementTree.SubElement(rows, "ScalarVariable", ends)
-        ElementTree.SubElement(row, FMI2_TYPES[v.type], {**_start(v), **({"unit": v.unit} if v.unit else {})})
+        (_add_variable2 if fmi == 2 else _add_variable3)(rows, d, v)
     structure = ElementTree.SubElement(root, "ModelStructure")
-    has_outputs = any(v.causality == OUTPUT for v in d.variables)
-    for group in ("Outputs", "InitialUnknowns") if has_outputs else ():
-        unknowns = ElementTree.SubElement(structure, group)
-        for v in d.variables:
-            if v.causality == OUTPUT:
-                known = _dependencies(d, v, with_parameters=group == "InitialUnknowns") if dependencies else {}
-                ElementTree.SubElement(unknowns, "Unknown", {"index": str(v.place), **known})
-    return _text(root)
+    for group, initial in (("Output", False), ("InitialUnknown", True)):
+        unknowns = [v for v in d.variables if v.causality == OUTPUT and not (initial and v.clock)]
+        element, reference = (structure, "valueReference")
+        if fmi == 2 and unknowns:
+            element, group, reference = ElementTree.SubElement(structure, f"{group}s"), "Unknown", "index"
+        for v in unknowns:
+            known = _dependencies(d, v, with_parameters=initial) if dependencies else {}
+            ElementTree.SubElement(element, group, {reference: str(v.place), **known})
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="unicode", xml_declaration=False)
 
 
-def description3(d: Declaration, step: float, dependencies: bool, flags: Mapping[str, bool]) -> str:
-    root = ElementTree.Element(
-        "fmiModelDescription",
-        fmiVersion="3.0",
-        modelName=d.name,
-        instantiationToken=d.name,
-        variableNamingConvention="structured",
-    )
-    states = not d.abilities & NO_STATES
-    given = {
+def _abilities(d: Declaration, fmi: int) -> dict[str, bool]:
+    state = "FMUstate" if fmi == 2 else "FMUState"
+    of_both = {
         "canHandleVariableCommunicationStepSize": not d.abilities & FIXED_STEP,
-        "canGetAndSetFMUState": states,
-        "canSerializeFMUState": states,
-        "providesDirectionalDerivatives": bool(d.abilities & DERIVATIVES),
-        "hasEventMode": bool(d.abilities & EVENTS),
-        "mightReturnEarlyFromDoStep": bool(d.abilities & EARLY_RETURN),
+        f"canGetAndSet{state}": not d.abilities & NO_STATES,
+        f"canSerialize{state}": not d.abilities & NO_STATES,
+        "providesDirectionalDerivative" + "s" * (fmi == 3): bool(d.abilities & DERIVATIVES),
     }
-    ElementTree.SubElement(root, "CoSimulation", {"modelIdentifier": d.name, **_booleans({**given, **flags})})
-    _add_units(root, d)
-    ElementTree.SubElement(root, "DefaultExperiment", startTime="0", stopTime="1", stepSize=repr(step))
-    rows = ElementTree.SubElement(root, "ModelVariables")
-    time = {"name": "time", "valueReference": "0", "causality": "independent", "variability": "continuous"}
-    ElementTree.SubElement(rows, "Float64", time)
-    for v in d.variables:
-        _add_variable3(rows, d, v)
-    structure = ElementTree.SubElement(root, "ModelStructure")
-    for group in ("Output", "InitialUnknown"):
-        for v in d.variables:
-            if v.causality == OUTPUT and (group == "Output" or not v.clock):
-                known = _dependencies(d, v, with_parameters=group == "InitialUnknown") if dependencies else {}
-                ElementTree.SubElement(structure, group, {"valueReference": str(v.place), **known})
-    return _text(root)
+    if fmi == 2:
+        return {**of_both, "canInterpolateInputs": bool(d.abilities & INTERPOLATES)}
+    events = {"hasEventMode": EVENTS, "mightReturnEarlyFromDoStep": EARLY_RETURN}
+    return {**of_both, **{name: bool(d.abilities & flag) for name, flag in events.items()}}
+
+
+def _add_variable2(rows: ElementTree.Element, d: Declaration, v: Variable) -> None:
+    ends = {"name": v.name, "valueReference": str(d.reference(v.name, fmi=2)), **_kind(d, v)}
+    row = ElementTree.SubElement(rows, "ScalarVariable", ends)
+    ElementTree.SubElement(row, FMI2_TYPES[v.type], {**_start(v), **({"unit": v.unit} if v.unit else {})})
 
 
 def _add_variable3(rows: ElementTree.Element, d: Declaration, v: Variable) -> None:
@@ -165,8 +147,3 @@ def _add_units(root: ElementTree.Element, d: Declaration) -> None:
 
 def _booleans(flags: Mapping[str, bool]) -> dict[str, str]:
     return {name: str(value).lower() for name, value in flags.items()}
-
-
-def _text(root: ElementTree.Element) -> str:
-    ElementTree.indent(root)
-    return ElementTree.tostring(root, encoding="unicode", xml_declaration=False)

@@ -19,7 +19,7 @@ import fmpy
 from handover.cosim.fmu.file.fmpy_edge import library_path
 from handover.fmus.compile import TARGETS, cache_folder, host_platform, zig_cc
 from support.cosim.native_declaration import Declaration, read_declarations
-from support.cosim.native_description import description2, description3
+from support.cosim.native_description import description
 
 SOURCES = Path(__file__).parents[2] / "cosim" / "native"
 FAULTS = Path(__file__).parents[2] / "faults" / "units"
@@ -39,9 +39,8 @@ def native_fmu(name: str, fmi: int = 3, *, step: float | None = None, dependenci
     options = repr((name, fmi, step, dependencies, sorted(flags.items())))
     file = _folder() / f"{name}-{fmi}-{hashlib.sha256(options.encode()).hexdigest()[:12]}.fmu"
     if not file.is_file():
-        describe = description2 if fmi == 2 else description3
-        description = describe(declaration, step or declaration.step, dependencies, flags)
-        _write_once(file, lambda part: _pack(part, fmi, name, description))
+        text = description(declaration, fmi, step or declaration.step, dependencies, flags)
+        _write_once(file, lambda part: _pack(part, fmi, name, text))
     return file
 
 
@@ -57,7 +56,7 @@ def _folder() -> Path:
     for source in [
         *sorted(SOURCES.rglob("*.[ch]")),
         *sorted(FAULTS.glob("*.c")),
-        *sorted(SOURCES.parent.glob("native_*.py")),
+        *sorted(Path(__file__).parent.glob("native_*.py")),
     ]:
         digest.update(source.name.encode() + source.read_bytes())
     folder = cache_folder() / "native-units" / digest.hexdigest()[:16]

@@ -12,7 +12,7 @@ import fmpy
 from handover.cosim.fmu.file.fmpy_edge import library_path
 from handover.fmus.compile import TARGETS, cache_folder, host_platform, zig_cc
 from support.cosim.native_declaration import Declaration, read_declarations
-from support.cosim.native_description import description2, description3
+from support.cosim.native_description import description
 from support.cosim.native_units import HEADERS, SOURCES
 
 _SOURCE = Path(__file__).parents[2] / "faults" / "units" / "by_name" / "faults.c"
@@ -22,10 +22,9 @@ _FRAME = [SOURCES / "frame" / name for name in ("unit.c", "fmi3_refused.c", "uni
 def faulty_fmu(name: str, fmi: int, folder: Path, *, blob: bool = False) -> Path:
     """Write the FMU of a unit whose library has a name, `FAULT_in_CALL`, or another if it is sound; return its file."""
     declared = _declarations()["with_blob" if blob else "integrator"]
-    describe = description2 if fmi == 2 else description3
-    description = describe(declared, declared.step, True, {})
-    described = description.replace(f'modelIdentifier="{declared.name}"', f'modelIdentifier="{name}"')
-    assert described != description
+    sound = description(declared, fmi, declared.step, True, {})
+    described = sound.replace(f'modelIdentifier="{declared.name}"', f'modelIdentifier="{name}"')
+    assert described != sound
     file = folder / f"{name}.fmu"
     with zipfile.ZipFile(file, "w") as archive:
         archive.writestr("modelDescription.xml", described)
