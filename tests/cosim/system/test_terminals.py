@@ -83,7 +83,7 @@ CASES: dict[str, tuple[Mapping[str, str], str, Mapping[str, str], str, str]] = {
     "shapes differ": (POSE, TIP, {"p": "m 2", "q": "1 4"}, TIP, ""),
     "a flow and a signal": ({"x": "N"}, named("pin", f="x inflow"), {"z": "N"}, named("pin", f="z"), ""),
     "a fault of the giver's": (POSE, named("tip", p="nowhere"), POSE, TIP, ""),
-    "a fault of the taker's": (POSE, "", POSE, named("tip", p="nowhere"), ""),
+    "a fault of the taker's": (POSE, "", POSE, named("tip", p="nowhere"), "a.p>b.p a.q>b.q"),
 }  # fmt: skip
 
 
@@ -97,6 +97,13 @@ def test_which_terminals_match(case: str, bench: Bench, wording: Wording):
     else:
         assert not bench.system.connections
         wording.check(bench.faults)
+
+
+def test_faulty_terminals_of_both_ends_are_refused_as_a_whole(bench: Bench):
+    a, b = bench.giver("arm", POSE, named("tip", p="nowhere")), bench.taker("hand", POSE, TIP)
+    bench.system.connect(a.y, b.u)
+    bench.system.connect(a.y, bench.taker("faulty", POSE, named("tip", p="nowhere")).u)
+    assert "connect the ports that are meant one by one, not the units as a whole" in bench.faults
 
 
 def test_an_ambiguity_names_the_candidates_and_is_settled_by_naming_terminals_in_pairs(bench: Bench, wording: Wording):
