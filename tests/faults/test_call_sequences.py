@@ -22,7 +22,7 @@ from handover.fmus.build import build_block, cached
 from handover.fmus.catalog import UNITS
 
 SEED = 20
-FEW, FEW_APART = 25, 10
+FEW = 12
 MANY = 2000
 SOON = 3.0
 HUNG = 60.0
@@ -32,6 +32,8 @@ APART = {"FMU_PYTHON_PROCESS": "1"}
 
 KINDS = ("legal", "illegal")
 SAMPLES = ("every_kind:EveryKind", "sampled:Sampled", "tangent:Tangent", "bouncing_ball:BouncingBall")
+IN_DEFAULT = [(SAMPLES[0], 2), (SAMPLES[3], 3)]
+OTHERS = [(block, fmi) for block in SAMPLES for fmi in (2, 3) if (block, fmi) not in IN_DEFAULT]
 LIGHT = ("Push", "HybridKinematics")
 ONLY_FMI3 = ("StereoCamera", "HandoverVision")
 
@@ -129,8 +131,8 @@ def pool(tmp_path: Path) -> Iterator[WorkerPool]:
     made.end()
 
 
-def sample_fmus(folder: Path) -> list[tuple[Path, int]]:
-    return [(build_block(f"support.sample_units.{block}", fmi, folder), fmi) for block in SAMPLES for fmi in (2, 3)]
+def sample_fmus(folder: Path, samples: "list[tuple[str, int]]") -> list[tuple[Path, int]]:
+    return [(build_block(f"support.sample_units.{block}", fmi, folder), fmi) for block, fmi in samples]
 
 
 def catalog_fmus(names: "tuple[str, ...]") -> list[tuple[Path, int]]:
@@ -138,17 +140,14 @@ def catalog_fmus(names: "tuple[str, ...]") -> list[tuple[Path, int]]:
 
 
 def test_a_few_sequences_on_light_units(pool: WorkerPool, tmp_path: Path):
-    samples = [
-        (build_block(f"support.sample_units.{b}", 2 + k % 2, tmp_path), 2 + k % 2) for k, b in enumerate(SAMPLES)
-    ]
-    pool.add([*samples, (cached(LIGHT[0], 2), 2), (cached(LIGHT[1], 3), 3)], FEW)  # each in one of the standards
-    pool.add(catalog_fmus(LIGHT[:1])[1:], FEW_APART, kinds=KINDS[1:], apart=True)
+    pool.add(sample_fmus(tmp_path, IN_DEFAULT), FEW)
     pool.run()
 
 
 @pytest.mark.slow
-def test_a_few_with_python_apart(pool: WorkerPool):
-    pool.add(catalog_fmus(LIGHT[:1]), 2 * FEW_APART, apart=True)
+def test_a_few_sequences_on_others_and_with_python_apart(pool: WorkerPool, tmp_path: Path):
+    pool.add([*sample_fmus(tmp_path, OTHERS), *catalog_fmus(LIGHT)], FEW)
+    pool.add(catalog_fmus(LIGHT[:1]), FEW, apart=True)
     pool.run()
 
 
@@ -173,6 +172,6 @@ def test_a_unit_that_crashes_or_hangs_is_reported_with_its_last_calls(pool: Work
 @pytest.mark.fuzz
 def test_many_sequences_on_every_unit(pool: WorkerPool, tmp_path: Path):
     slowest_first = sorted(UNITS, key=lambda n: (n not in ONLY_FMI3, n != "TendonArm"))
-    pool.add([*catalog_fmus(tuple(slowest_first)), *sample_fmus(tmp_path)], MANY)
+    pool.add([*catalog_fmus(tuple(slowest_first)), *sample_fmus(tmp_path, IN_DEFAULT + OTHERS)], MANY)
     pool.add(catalog_fmus(LIGHT[:1]), MANY // 5, apart=True)
     pool.run()

@@ -5,9 +5,10 @@ from pathlib import Path
 
 import pytest
 from support.cosim.experiment_files import INPUTS, SETUP, STIMULUS, manifest, packed
+from support.wording import Wording
 
 from handover.cosim.experiments.experiment_run import communication_points
-from handover.cosim.experiments.manifest import FOLDER, MANIFEST, related_files
+from handover.cosim.experiments.manifest import related_files
 from handover.cosim.experiments.reference_experiment import experiments_in
 from handover.cosim.experiments.signal_table import read_table
 from handover.cosim.fmu.file.archive import FmuArchive
@@ -19,46 +20,35 @@ def manifest_findings(fmu: Path) -> list[tuple[Level, str]]:
     return [(f.level, f.line) for f in [*findings, *experiments_in(files)[1]]]
 
 
-@pytest.mark.parametrize(
-    ("content", "level", "wanted"),
-    [
-        (b"<fmiReferences", Level.FAULT, f"{MANIFEST}: it is not well-formed"),
-        (b'<!DOCTYPE a [<!ENTITY b "c">]><fmiReferences/>', Level.FAULT, "it has a document type"),
-        (b"<Manifest/>", Level.FAULT, "its outermost element is <Manifest>; <fmiReferences> is right"),
-        (b"<fmiReferences/>", Level.FAULT, "line 1: it has no attribute fmi-ls-name of the namespace"),
-        (manifest("<Other/>"), Level.FAULT, "<Other> is not known; <Related> or <Annotations> is right"),
-        (manifest('<Related role="model"/>'), Level.FAULT, "a file without a source"),
-        (manifest('<Related source="a" role="code"/>'), Level.FAULT, "role 'code' is not known; one of document,"),
-        (manifest('<Related source="a" role="experiment/quick"/>'), Level.FAULT, "experiment/smoke-test, experiment/v"),
-        (manifest('<Related source="a" role="model/x"/>'), Level.FAULT, "a sub-role that is not known; model is right"),
-        (manifest('<Related source="../../../a" role="model"/>'), Level.FAULT, "'../../../a' leads out of the archive"),
-        (manifest('<Related source="..%2F..%2F..%2Fa" role="model"/>'), Level.FAULT, "leads out of the archive"),
-        (manifest('<Related source="/etc/passwd" role="model"/>'), Level.FAULT, "leads out of the archive"),
-        (manifest('<Related source="x.csv" role="model"/>'), Level.WARNING, f"{FOLDER}/x.csv is not in the archive"),
-        (manifest('<Related source="https://a.b/c" role="model"/>'), Level.NOTE, "lies outside of the FMU"),
-        (manifest('<Related source="//[" role="model"/>'), Level.NOTE, "lies outside of the FMU"),
-        (manifest(STIMULUS.format("")), Level.WARNING, "in.csv: no result belongs to it; a CSV file of role result"),
-        (manifest('<Related source="in.exp" role="experiment"/>'), Level.NOTE, "application/octet-stream are not run"),
-        (manifest(STIMULUS.format(SETUP.format("x", ""))), Level.FAULT, "relative='x' is no tolerance"),
-        (manifest(STIMULUS.format(SETUP.format("1", "").replace("1/10", "0"))), Level.FAULT, "step='0' is no positive"),
-    ],
-)  # fmt: skip
-def test_a_manifest_at_fault_is_reported(tmp_path: Path, content: bytes, level: Level, wanted: str):
-    found = manifest_findings(packed(tmp_path, content, {"in.csv": INPUTS, "in.exp": ""}))
-    assert any(each is level and wanted in line for each, line in found), found
+RELATED = (
+    '<Related role="model"/>',
+    '<Related source="a" role="code"/>',
+    '<Related source="a" role="experiment/quick"/>',
+    '<Related source="a" role="model/x"/>',
+    '<Related source="../../../a" role="model"/>',
+    '<Related source="..%2F..%2F..%2Fa" role="model"/>',
+    '<Related source="/etc/passwd" role="model"/>',
+    '<Related source="x.csv" role="model"/>',
+    '<Related source="https://a.b/c" role="model"/>',
+    '<Related source="//[" role="model"/>',
+    '<Related source="in.exp" role="experiment"/>',
+    STIMULUS.format(""),
+    STIMULUS.format(SETUP.format("x", "")),
+    *(STIMULUS.format(SETUP.format("1", "").replace("1/10", step)) for step in ("0", "-1", "1/0", f"1/{'9' * 400}")),
+)
 
 
-def step_finding(folder: Path, step: str) -> tuple[Level, str]:
-    """Return the first finding of a manifest whose experiment has a step."""
-    content = manifest(STIMULUS.format(SETUP.format("1", "").replace("1/10", step)))
-    return manifest_findings(packed(folder, content, {"in.csv": INPUTS}))[0]
-
-
-@pytest.mark.parametrize("step", ["-1", "1/0", f"1/{'9' * 400}"])
-def test_a_step_that_is_not_positive_or_that_no_double_holds_is_refused(tmp_path: Path, step: str):
-    level, line = step_finding(tmp_path, step)
-    assert level is Level.FAULT
-    assert f"step='{step[:40]}' is no positive number of seconds" in line
+def test_a_manifest_at_fault_is_reported(tmp_path: Path, wording: Wording):
+    whole = (
+        b"<fmiReferences",
+        b'<!DOCTYPE a [<!ENTITY b "c">]><fmiReferences/>',
+        b"<Manifest/>",
+        b"<fmiReferences/>",
+        manifest("<Other/>"),
+    )
+    for content in (*whole, *(manifest(related) for related in RELATED)):
+        found = manifest_findings(packed(tmp_path, content, {"in.csv": INPUTS, "in.exp": ""}))
+        wording.check("\n".join(f"{level.name}: {line}" for level, line in found))
 
 
 @pytest.mark.parametrize("step", ["nan", "1e20000000", "1e-20000000", "0e99999999", "1" * 5000])
@@ -69,7 +59,8 @@ def test_a_step_that_would_take_long_is_refused_before_it_is_made_exact(
         raise AssertionError(f"{text[:40]} is made exact")
 
     monkeypatch.setattr("handover.cosim.experiments.reference_experiment.Fraction", exact)
-    level, line = step_finding(tmp_path, step)
+    content = manifest(STIMULUS.format(SETUP.format("1", "").replace("1/10", step)))
+    level, line = manifest_findings(packed(tmp_path, content, {"in.csv": INPUTS}))[0]
     assert level is Level.FAULT
     assert f"step='{step[:40]}' is no positive number of seconds" in line
 

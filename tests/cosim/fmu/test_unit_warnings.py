@@ -49,14 +49,7 @@ WAYS: dict[str, dict[str, Any]] = {
 }
 
 
-@pytest.mark.parametrize("fmi", [2, 3])
-@pytest.mark.parametrize("way", WAYS)
-def test_steps_that_warn_are_counted_from_the_first_on(way: str, fmi: int, tmp_path: Path):
-    assert told(fmi, "step", tmp_path, **WAYS[way]) == right(fmi, DoStep=7)
-
-
-@pytest.mark.parametrize("algorithm", [Algorithm.GAUSS_SEIDEL, Algorithm.JACOBI])
-@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize(("fmi", "algorithm"), [(2, Algorithm.GAUSS_SEIDEL), (3, Algorithm.JACOBI)])
 def test_all_calls_that_warn_are_counted_alike_on_all_paths(fmi: int, algorithm: Algorithm, tmp_path: Path):
     """Also those of initialisation and termination, and what an isolated unit is set to later than it was asked for."""
     ways = {way: told(fmi, "all", tmp_path, algorithm=algorithm, **options) for way, options in WAYS.items()}

@@ -4,6 +4,7 @@ import tracemalloc
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from support.wording import Wording
 
 from handover.cosim.fmu.file.xml import UnsafeXml, parse_xml, with_prefixes
 
@@ -28,24 +29,21 @@ def test_a_billion_laughs_are_refused_without_being_laughed():
         tracemalloc.stop()
 
 
-@pytest.mark.parametrize(
-    ("content", "text"),
-    [
-        (b'<!DOCTYPE a SYSTEM "http://127.0.0.1:9/a.dtd"><a/>', "document type"),
-        (b'<!DOCTYPE a [<!ENTITY b SYSTEM "file:///etc/passwd">]><a>&b;</a>', "document type"),
-        (b"<!DOCTYPE a><a/>", "document type"),
-        ("<!DOCTYPE a [<!ENTITY b 'c'>]><a>&b;</a>".encode("utf-16"), "document type"),
-        (b"<a>&b;</a>", "undefined entity"),
-        (b"<a><b></a>", "not well-formed: mismatched tag: line 1"),
-        (b"", "not well-formed: no element found"),
-        (b'<a b="\xff"/>', "not well-formed"),
-        (b'<?xml version="1.0" encoding="klingon"?><a/>', "encoding"),
-        (b"<a>" * 300 + b"</a>" * 300, "not well-formed"),
-    ],
-)
-def test_what_is_not_to_be_read_is_refused(content: bytes, text: str):
-    with pytest.raises(UnsafeXml, match=text):
-        parse_xml(content)
+def test_what_is_not_to_be_read_is_refused(wording: Wording):
+    for content in (
+        b'<!DOCTYPE a SYSTEM "http://127.0.0.1:9/a.dtd"><a/>',
+        b'<!DOCTYPE a [<!ENTITY b SYSTEM "file:///etc/passwd">]><a>&b;</a>',
+        "<!DOCTYPE a [<!ENTITY b 'c'>]><a>&b;</a>".encode("utf-16"),
+        b"<a>&b;</a>",
+        b"<a><b></a>",
+        b"",
+        b'<a b="\xff"/>',
+        b'<?xml version="1.0" encoding="klingon"?><a/>',
+        b"<a>" * 300 + b"</a>" * 300,
+    ):
+        with pytest.raises(UnsafeXml) as caught:
+            parse_xml(content)
+        wording.check(caught.value)
 
 
 def test_prefixes_that_are_not_declared_are_made_up():
@@ -54,9 +52,8 @@ def test_prefixes_that_are_not_declared_are_made_up():
     b, c, e = root.children
     assert (root.tag, b.tag, c.tag, e.line) == ("a", "{urn:k}b", "{urn:v}c", 3)
     assert len(c.attributes) == 1
-    assert with_prefixes(text.replace(b"w:", b"").replace(b"<v:e/>", b"")) == text.replace(b"w:", b"").replace(
-        b"<v:e/>", b""
-    )
+    declared = text.replace(b"w:", b"").replace(b"<v:e/>", b"")
+    assert with_prefixes(declared) == declared
     assert parse_xml(text.decode().encode("utf-16")).children[2].line == 3
     with pytest.raises(UnsafeXml, match="mismatched tag"):
         parse_xml(b"<a><v:b></a>")

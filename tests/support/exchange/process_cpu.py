@@ -2,9 +2,9 @@
 
 import os
 import time
-from collections import defaultdict
 from collections.abc import Sequence
-from pathlib import Path
+
+from support import processes
 
 _OF_A_PROCESS = 2
 """Linux' mark, in a clock's number, of the clock that a process's scheduler keeps."""
@@ -16,17 +16,6 @@ def cpu_seconds(processes: Sequence[int]) -> float:
 
 
 def family(process: int | None = None) -> list[int]:
-    """Return a process, by default this one, and its descendants. To find them takes some milliseconds."""
-    children: dict[int, list[int]] = defaultdict(list)
-    for folder in Path("/proc").iterdir():
-        if folder.name.isdigit():
-            try:
-                state = (folder / "stat").read_text()
-            except OSError:  # it has ended
-                continue
-            children[int(state.rpartition(")")[2].split()[1])].append(int(folder.name))
-    found, waiting = list[int](), [os.getpid() if process is None else process]
-    while waiting:
-        found.append(waiting.pop())
-        waiting += children[found[-1]]
-    return found
+    """Return a process, by default this one, and its descendants."""
+    first = os.getpid() if process is None else process
+    return [first, *processes.family(first)]

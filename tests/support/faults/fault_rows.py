@@ -116,9 +116,9 @@ NOTES_BEFORE_START = {"load": ONLY_A, "instantiate": ONLY_A, "setup": FREED, "en
 
 NO_STATES = "the plan saves no states: with --repeat-discarded the run goes on the general path"
 PLAN = ("plan",)
-EACH = ("plan", "general", "isolated")
 SEGMENT = "segmentation fault"
 TRAPPED = "floating point exception"
+NO_START = ("b does not start", "the solver failed", "({call} answered Error)")
 HANG = "did not return within 2 s"
 
 
@@ -165,7 +165,7 @@ FAULTS = [
     crash("crash", "exit", SEGMENT),
     crash("crash", "set", SEGMENT),
     crash("crash", "get", SEGMENT, fast=("isolated",)),
-    crash("crash", "step", SEGMENT, fast=EACH),
+    crash("crash", "step", SEGMENT, fast=PLAN),
     crash("crash", "save", SEGMENT),
     crash("crash", "terminate", SEGMENT, notes=frozenset({"c terminated"})),
     crash("crash", "free", SEGMENT, notes=ALL - {"a freed"}),
@@ -173,7 +173,7 @@ FAULTS = [
     crash("divide", "step", ""),
     crash("abort", "load", "aborted"),
     crash("abort", "step", "aborted"),
-    crash("exit", "step", "it ended the process with status 0", fast=PLAN),
+    crash("exit", "step", "it ended the process with status 0"),
     crash("leave", "load", "it ended the process with status 0"),
     crash("leave", "step", "it ended the process with status 0"),
     crash("overflow", "step", SEGMENT),
@@ -188,38 +188,15 @@ FAULTS = [
     failure("hang", "free", 3, "b: {call} at t = 1 s", HANG),
     failure("hang", "unload", 3, "b", HANG),
     failure("error", "instantiate", 2, ".fmu: b: ", "the solver failed", rows=None, notes=ONLY_A),
-    failure(
-        "error", "setup", 2, "b does not start", "the solver failed", "({call} answered Error)", rows=None, notes=FREED
-    ),
-    failure(
-        "error",
-        "enter",
-        2,
-        "b does not start",
-        "the solver failed",
-        "({call} answered Error)",
-        rows=None,
-        notes=FREED,
-        fast=PLAN,
-    ),
-    failure(
-        "error",
-        "exit",
-        2,
-        "b does not start",
-        "the solver failed",
-        "({call} answered Error)",
-        rows=None,
-        notes=WITHOUT_C,
-    ),
+    failure("error", "setup", 2, *NO_START, rows=None, notes=FREED),
+    failure("error", "enter", 2, *NO_START, rows=None, notes=FREED, fast=PLAN),
+    failure("error", "exit", 2, *NO_START, rows=None, notes=WITHOUT_C),
     failure("error", "set", 3, "b: {call} at t = 0.3 s", "the solver failed", rows=UNTIL_FAULT),
     failure("error", "get", 3, "b: {call} at t = 0.3 s", "the solver failed", rows=UNTIL_OUTPUT),
-    failure("error", "step", 3, "b: {call} at t = 0.3 s", "the solver failed", rows=UNTIL_FAULT, fast=PLAN),
+    failure("error", "step", 3, "b: {call} at t = 0.3 s", "the solver failed", rows=UNTIL_FAULT),
     failure("error", "terminate", 3, "b: {call} at t = 1 s", "the solver failed"),
-    failure("discard", "exit", 2, "b does not start: {call} answered Discard", rows=None, notes=WITHOUT_C, fast=PLAN),
-    failure(
-        "fatal", "enter", 2, "b does not start", "memory is corrupt", "({call} answered Fatal)", rows=None, notes=FREED
-    ),
+    failure("discard", "exit", 2, "b does not start: {call} answered Discard", rows=None, notes=WITHOUT_C),
+    failure("fatal", "enter", 2, *NO_START[:1], "memory is corrupt", "({call} answered Fatal)", rows=None, notes=FREED),
     failure("fatal", "step", 3, "b: {call} at t = 0.3 s", "memory is corrupt", rows=UNTIL_FAULT, fast=PLAN),
     failure("discard", "step", 3, "b: {call} at t = 0.3 s", "Discard", rows=UNTIL_FAULT),
     failure("unknown", "step", 3, "b: {call} at t = 0.3 s", "77", rows=UNTIL_FAULT),
@@ -236,7 +213,7 @@ FAULTS = [
     harmless("log_bytes", "step", fast=PLAN),
     harmless("log_huge", "step"),
     harmless("chdir", "load"),
-    harmless("chdir", "step", fast=PLAN),
+    harmless("chdir", "step"),
     harmless("close_output", "step"),
     harmless("close_all", "load"),
     harmless("close_all", "step"),

@@ -1,11 +1,9 @@
 """The table of faults: what `handover run` makes of an SSP in which one unit does one thing wrong, in each way to run.
 
 The rows say what is right: exit status, what is told, rows recorded, and what the two sound units beside it note of
-their end. `python fault_table.py [WORD ...]` prints what is, of the faults whose names contain a word.
+their end.
 """
 
-import re
-import sys
 import tempfile
 from dataclasses import dataclass
 from functools import cache
@@ -16,7 +14,7 @@ import numpy as np
 from handover.cosim.record.reader import Record
 from support.commands import Command
 from support.cosim.ssp_of import component, connection, connectors, described, pack_ssp, system
-from support.faults.fault_rows import CALLS, FAULTS, LIMIT, WAYS, Fault
+from support.faults.fault_rows import CALLS, LIMIT, Fault
 from support.faults.faulty_units import faulty_fmu
 
 STOP = 1.0
@@ -98,36 +96,3 @@ def faults_of(fault: Fault, fmi: int, way: str, seen: Seen) -> list[str]:
     if "Traceback" in seen.output:
         found.append("a traceback is told")
     return found
-
-
-def row_of(fault: Fault, fmi: int, way: str) -> tuple[str, bool]:
-    """Return a line of the table, of a run made for it, and whether all is right in it."""
-    if way in fault.left_out:
-        return f"| {fault.name} | {fmi} | {way} | | | | *left out: {fault.left_out[way]}* |", True
-    with tempfile.TemporaryDirectory() as folder:
-        seen = run_fault(fault, fmi, way, Path(folder))
-        lines = [line.replace(f"{folder}/", "") for line in seen.output.splitlines() if line.strip()]
-    wrong = "; ".join(faults_of(fault, fmi, way, seen))
-    told = next((line for line in lines if re.search(r"\bb\b", line) and "system.ssp failed" not in line), "")
-    counts = [sum(note.endswith(what) for note in seen.notes) for what in ("terminated", "freed")]
-    rows = "no folder" if seen.rows is None else seen.rows
-    flaw = f" **{wrong}**" if wrong else ""
-    cells = (fault.name, fmi, way, seen.status, rows, f"{counts[0]}, {counts[1]}", f"{told.strip()[:150]}{flaw}")
-    return f"| {' | '.join(map(str, cells))} |", not wrong
-
-
-def main() -> None:
-    """Print the table of the faults whose names contain one of the arguments, all without any."""
-    words, runs, wrong = sys.argv[1:], 0, 0
-    print("| fault | FMI | way | status | rows | terminated, freed | told |\n|---|---|---|---|---|---|---|")
-    for fault in FAULTS:
-        for fmi in fault.standards if not words or any(w in fault.name for w in words) else ():
-            for way in WAYS:
-                line, right = row_of(fault, fmi, way)
-                print(line, flush=True)
-                runs, wrong = runs + (way in fault.ways), wrong + (not right)
-    print(f"\n{runs} runs, {wrong} of them wrong")
-
-
-if __name__ == "__main__":
-    main()
