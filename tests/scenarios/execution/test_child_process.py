@@ -46,21 +46,41 @@ def begin_call(beat: Heartbeat) -> None:
     beat.begin(beat.code("bad", "fmi3DoStep"), 0.1)
 
 
-def test_a_call_that_does_not_return_is_ended(beat: Heartbeat):
-    end = ended(forked(beat, lambda: (begin_call(beat), time.sleep(60))))
-    assert (end.signal, end.hung, end.stopped) == (signal.SIGKILL, True, False)
+def hang_in_call(beat: Heartbeat) -> None:
+    begin_call(beat)
+    time.sleep(60)
+
+
+def say_status(beat: Heartbeat) -> None:
+    beat.status = 3
+    time.sleep(60)
+
+
+def close_descriptors(beat: Heartbeat) -> None:
+    os.closerange(3, 1024)
+    hang_in_call(beat)
+
+
+@pytest.mark.parametrize(
+    ("work", "hung", "status"), [(hang_in_call, True, None), (say_status, False, 3), (close_descriptors, True, None)]
+)
+def test_a_child_that_does_not_end_is_ended(
+    work: Callable[[Heartbeat], None], hung: bool, status: int | None, beat: Heartbeat
+):
+    end = ended(forked(beat, lambda: work(beat)))
+    assert (end.signal, end.hung, end.stopped, beat.status) == (signal.SIGKILL, hung, False, status)
 
 
 def test_a_child_that_is_stopped_in_a_call_does_not_hang(beat: Heartbeat):
     child = forked(beat, lambda: (begin_call(beat), time.sleep(0.2), beat.end()))
     os.kill(child.pid, signal.SIGSTOP)
-    subprocess.Popen(["sh", "-c", f"sleep 2; kill -CONT {child.pid}"]).poll()
+    subprocess.Popen(["sh", "-c", f"sleep 1; kill -CONT {child.pid}"]).poll()
     end = ended(child)
     assert (end.signal, end.status, end.hung, end.stopped) == (None, 0, False, False)
 
 
 def test_a_child_that_stays_stopped_is_given_up_but_did_not_hang(beat: Heartbeat):
-    child = forked(beat, lambda: (begin_call(beat), time.sleep(60)))
+    child = forked(beat, lambda: hang_in_call(beat))
     os.kill(child.pid, signal.SIGSTOP)
     end = ended(child, stop_limit=1.0)
     assert (end.signal, end.hung, end.stopped) == (signal.SIGKILL, False, True)
@@ -77,24 +97,6 @@ def test_memory_that_is_read_back_from_the_disk_does_not_count_as_hanging():
         return stall_timer.poll()
 
     assert [after(0.2, 0), after(0.2, 0), after(0.2, 7), after(0.2, 0)] == pytest.approx([0.0, 0.2, 0.2, 0.4])
-
-
-def test_a_child_that_has_said_its_status_and_does_not_end_is_ended(beat: Heartbeat):
-    def finish() -> None:
-        beat.status = 3
-        time.sleep(60)
-
-    end = ended(forked(beat, finish))
-    assert (end.signal, end.hung, beat.status) == (signal.SIGKILL, False, 3)
-
-
-def test_a_child_that_closes_all_its_descriptors_is_still_watched(beat: Heartbeat):
-    def close_and_hang() -> None:
-        os.closerange(3, 1024)
-        begin_call(beat)
-        time.sleep(60)
-
-    assert ended(forked(beat, close_and_hang)).hung
 
 
 _PARENT = """

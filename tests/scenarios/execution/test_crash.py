@@ -1,11 +1,11 @@
 """Units that crash or hang: the command names them, keeps the record, leaves nothing else and exits with status 3."""
 
-import json
 import sys
 from fractions import Fraction
 from pathlib import Path
 
 import pytest
+from support.commands import data_in
 from support.cosim.native_units import native_fmu
 from support.failing_systems import failing_ssp, start
 
@@ -25,19 +25,16 @@ HANG = "bad: fmi{}DoStep at t = 0.2 s did not return within 0.5 s"
     ("bad", "fmi", "text", "kind", "has_page"),
     [
         ("crashes", 3, CRASH, "crash", True),
-        ("crashes", 2, CRASH, "crash", False),
         ("exits", 3, EXIT, "crash", False),
         ("hangs", 2, HANG, "hang", False),
-        ("hangs", 3, HANG, "hang", False),
     ],
 )
 def test_a_run_whose_unit_does_not_come_back_is_complete_to_the_last_good_step(
     bad: str, fmi: int, text: str, kind: str, has_page: bool, tmp_path: Path
 ):
     more = () if has_page else ("--no-report",)
-    status, shown, errors = start(
-        tmp_path, failing_ssp(tmp_path, bad, fmi), "--out", "r", "--call-limit", "0.5", *more
-    ).wait()
+    ssp = failing_ssp(tmp_path, bad, fmi)
+    status, shown, errors = start(tmp_path, ssp, "--out", "r", "--call-limit", "0.5", *more).wait()
     assert status == 3, errors
     said, *doing = errors.splitlines()
     assert said == text.format(fmi)
@@ -49,7 +46,7 @@ def test_a_run_whose_unit_does_not_come_back_is_complete_to_the_last_good_step(
     assert {p.name for p in out.iterdir()} == left
     assert list((tmp_path / "tmp").iterdir()) == []
     assert Record(out / "signals.parquet").time.tolist() == [0.0, 0.1, 0.2]
-    summary, run = (json.loads((out / f"{name}.json").read_text()) for name in ("summary", "run"))
+    summary, run = data_in(out), data_in(out, "run")
     assert summary["failure"] == run["failure"]
     assert (summary["success"], summary["complete"], summary["simulated_seconds"]) == (False, False, 0.2)
     failure = {key: summary["failure"][key] for key in ("kind", "instance", "call", "time", "log")}

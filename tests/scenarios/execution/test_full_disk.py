@@ -6,11 +6,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import CliRunner
+from support.commands import call
 from support.failing_systems import failing_ssp
 
 from handover.cosim.record.reader import Record
-from handover.scenarios.cli.command import main
 
 FILES = ["run.json", "signals.csv", "summary.json", "report.html"]
 
@@ -27,7 +26,7 @@ def test_a_full_disk_is_reported_and_the_record_is_kept(full: str, tmp_path: Pat
     file, out = failing_ssp(tmp_path, "gain"), tmp_path / "out"
     monkeypatch.setattr(os, "replace", refuse)
     more = () if full == "report.html" else ("--no-report",)
-    result = CliRunner().invoke(main, ["run", str(file), "--format", "csv", "--out", str(out), *more])
+    result = call("run", file, "--format", "csv", "--out", out, *more)
     text = out / ("signals.parquet" if full == "signals.csv" else full)
     assert result.exit_code == 3
     assert result.output.splitlines()[-1] == f"Error: {text} cannot be written: No space left on device"

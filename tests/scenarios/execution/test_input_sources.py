@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from numpy.typing import NDArray
+from support.commands import call, data_in, refusal
 from support.cosim.native_units import native_fmu
 from support.kept_runs import kept_run
 from support.scenarios.flyer_runs import task_of
@@ -21,8 +21,6 @@ import handover
 from handover.cosim.record.reader import Record
 from handover.cosim.system.system import System
 from handover.cosim.system.time_series import ExternalSource, TimeSeries
-from handover.scenarios.cli.command import main
-from handover.scenarios.cli.run import run as run_command
 from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.execution.input_sources import give_inputs, played_back, resumed_inputs
 from handover.scenarios.execution.interruption import Interruption
@@ -71,40 +69,34 @@ def tell_nobody(*_: float) -> None:
     pass
 
 
-def led_by_script(wanted: Path, out: Path, *given: str) -> bool:
+def led_by_script(wanted: Path, out: Path) -> None:
     sizes = {"person.p_WH_track": 3, "person.q_WH_track": 4, "person.finger_track": 14, "person.closed_track": 1}
     inputs = SharedInputs.create(out.with_suffix(".inputs"), sizes, ["person.age"])
     script = Scripted(inputs, Record(wanted / "signals.parquet"))
     inputs = InputSources(script.sources(), {"from": "program", "what": "a script"})
-    task = replace(task_of(RobotToHuman, out, "hand=outside", *given), inputs=inputs)
-    return run_task(task, tell_nobody, Interruption()).outcome.success
+    task = replace(task_of(RobotToHuman, out, "hand=outside"), inputs=inputs, stop=Fraction(1))
+    run_task(task, tell_nobody, Interruption())
 
 
 @pytest.mark.slow
 def test_a_run_led_by_shared_inputs_is_played_back_byte_for_byte(tmp_path: Path):
-    person = kept_run("run", "flyer_robot_to_human", "-p", "skill=1", "--no-report")
-    assert led_by_script(person, tmp_path / "led")
+    person = kept_run("run", "flyer_robot_to_human", "--no-report", "--stop", "1")
+    led_by_script(person, tmp_path / "led")
     led = Record(tmp_path / "led" / "signals.parquet")
     assert led["person.age"].max() < 0.2
-    assert led["person.closed_track"].any()
-    again = handover.run(
-        "flyer_robot_to_human", hand="outside", inputs_from=tmp_path / "led", out=tmp_path / "again", progress=False
-    )
-    assert again.success
+    assert np.ptp(led["person.p_WH_track"], axis=0).max() > 0.01
+    again: dict[str, Any] = {"hand": "outside", "inputs_from": tmp_path / "led", "stop": 1, "progress": False}
+    handover.run("flyer_robot_to_human", out=tmp_path / "again", **again)
     a, b = ((tmp_path / name / "signals.parquet").read_bytes() for name in ("led", "again"))
     assert a == b
-    told = [json.loads((tmp_path / name / "run.json").read_text()) for name in ("led", "again")]
+    told = [data_in(tmp_path / name, "run") for name in ("led", "again")]
     assert told[0]["inputs"] == {"from": "program", "what": "a script"}
-    assert told[1]["inputs"]["from"] == "run"
-    assert told[1]["inputs"]["folder"] == str(tmp_path / "led")
+    assert (told[1]["inputs"]["from"], told[1]["inputs"]["folder"]) == ("run", str(tmp_path / "led"))
     assert told[0]["external_inputs"] == told[1]["external_inputs"] == [*GOALS, "person.age"]
-    compliant = ["flyer_robot_to_human", "-p", "hand=outside", "-p", "behaviour=compliant", "--no-report"]
-    other = [*compliant, "--inputs-from", str(tmp_path / "led"), "--out", str(tmp_path / "other")]
-    assert "Traceback" not in CliRunner().invoke(run_command, other).output
+    handover.run("flyer_robot_to_human", out=tmp_path / "other", behaviour="compliant", **again)
     meets_the_same_hand = Record(tmp_path / "other" / "signals.parquet")
-    n = min(len(meets_the_same_hand.time), len(led.time))
-    np.testing.assert_array_equal(meets_the_same_hand["person.p_WH_track"][:n], led["person.p_WH_track"][:n])
-    assert np.abs(meets_the_same_hand["robot.p_WG"][:n] - led["robot.p_WG"][:n]).max() > 0.001
+    np.testing.assert_array_equal(meets_the_same_hand["person.p_WH_track"], led["person.p_WH_track"])
+    assert not np.array_equal(meets_the_same_hand["robot.p_WG"], led["robot.p_WG"])
 
 
 def pushed_mass(source: ExternalSource | None) -> System:
@@ -124,49 +116,35 @@ def test_a_system_wired_in_python_is_played_back(tmp_path: Path):
     assert Record(tmp_path / "b" / "signals.parquet")["mass.v"][-1] != 0.0
 
 
-@pytest.mark.parametrize(
-    ("given", "why"),
-    [
-        (
-            ["flyer_robot_to_human", "-p", "hand=outside"],
-            "person.age: comes from outside in this run, and did not in the recorded one",
-        ),
-        (
-            ["flyer_robot_to_human"],
-            "mass.f: this run takes no values from outside for it; with which parameters the recorded run takes them",
-        ),
-    ],
-)
-def test_a_run_that_lacks_inputs_is_refused_before_anything_is_written(tmp_path: Path, given: list[str], why: str):
+def test_a_run_that_lacks_inputs_is_refused_before_anything_is_written(tmp_path: Path):
     handover.run(pushed_mass(None), out=tmp_path / "mass", stop=Fraction(1, 10), progress=False)
-    out = tmp_path / "out"
-    told = CliRunner().invoke(run_command, [*given, "--inputs-from", str(tmp_path / "mass"), "--out", str(out)])
-    assert told.exit_code == 2
-    assert why in told.output
-    assert not out.exists()
+    for given, why in (
+        (["-p", "hand=outside"], "person.age: comes from outside in this run, and did not in the recorded one"),
+        ([], "mass.f: this run takes no values from outside for it; with which parameters the recorded run takes them"),
+    ):
+        out = tmp_path / "out"
+        assert why in refusal("run", "flyer_robot_to_human", *given, "--inputs-from", tmp_path / "mass", "--out", out)
+        assert not out.exists()
 
 
 def test_a_run_that_goes_on_after_its_recorded_inputs_says_when_they_end(tmp_path: Path):
-    given = ["flyer_robot_to_human", "-p", "hand=outside", "--no-report", "--stop"]
-    assert CliRunner().invoke(run_command, [*given, "0.08", "--out", str(tmp_path / "led")]).exit_code == 1
-    for stop, goes_on in (("0.08", False), ("0.16", True)):
-        again = [*given, stop, "--inputs-from", str(tmp_path / "led"), "--out", str(tmp_path / f"until {stop}")]
-        output = CliRunner().invoke(run_command, again).output
-        assert ("the recorded inputs end at 0.08 s, and the run went on until 0.16 s" in output) is goes_on
+    given = ("run", "flyer_robot_to_human", "-p", "hand=outside", "--no-report", "--stop")
+    assert call(*given, "0.08", "--out", tmp_path / "led").exit_code == 1
+    output = call(*given, "0.16", "--inputs-from", tmp_path / "led", "--out", tmp_path / "again").output
+    assert "the recorded inputs end at 0.08 s, and the run went on until 0.16 s" in output
 
 
-def test_a_folder_without_inputs_from_outside_is_refused(tmp_path: Path):
-    with pytest.raises(InvalidRunFolder, match="not the folder of a run"):
-        played_back(tmp_path)
-    (tmp_path / "run.json").write_text('{"scenario": "a", "parameters": {}}')
-    with pytest.raises(InvalidRunFolder, match="the run had no inputs from outside"):
-        played_back(tmp_path)
-    (tmp_path / "run.json").write_text('{"scenario": "a", "parameters": {}, "external_inputs": ["mass.f"]}')
-    with pytest.raises(InvalidRunFolder, match="no record"):
-        played_back(tmp_path)
-
-
-def test_a_series_of_another_size_is_refused():
+def test_a_folder_without_inputs_from_outside_and_a_series_of_another_size_are_refused(tmp_path: Path):
+    run = {"scenario": "a", "parameters": {}}
+    for content, why in (
+        (None, "not the folder of a run"),
+        (run, "the run had no inputs from outside"),
+        ({**run, "external_inputs": ["mass.f"]}, "no record"),
+    ):
+        if content is not None:
+            (tmp_path / "run.json").write_text(json.dumps(content))
+        with pytest.raises(InvalidRunFolder, match=why):
+            played_back(tmp_path)
     inputs: Mapping[str, ExternalSource] = {"mass.f": TimeSeries([0.0], [[1.0, 2.0]], linear=False)}
     with pytest.raises(UsageError, match=r"mass\.f: 2 values a time where 1 is right"):
         give_inputs(pushed_mass(None), InputSources(inputs, {}))
@@ -195,10 +173,7 @@ def held_until(released: float, force: float) -> dict[str, ExternalSource]:
     }
 
 
-@pytest.mark.parametrize(
-    "is_page",
-    [pytest.param(True, id="pushed by a page"), pytest.param(False, id="with nobody", marks=pytest.mark.slow)],
-)
+@pytest.mark.parametrize("is_page", [True, pytest.param(False, marks=pytest.mark.slow)], ids=["page", "nobody"])
 def test_a_run_that_could_be_pushed_is_resumed_as_it_was_recorded_and_is_then_let_go(tmp_path: Path, is_page: bool):
     task = task_of(FlyerImpedance, tmp_path / "whole", "begin=30")
     inputs = InputSources(held_until(0.6, 4.0), {"from": "page"}) if is_page else None
@@ -213,8 +188,7 @@ def test_a_run_that_could_be_pushed_is_resumed_as_it_was_recorded_and_is_then_le
     run_task(task, snapshot, Interruption())
     whole = Record(tmp_path / "whole" / "signals.parquet")
     for name in at:
-        told = CliRunner().invoke(main, ["resume", str(tmp_path / name), "--no-report"])
-        assert "Traceback" not in told.output
+        told = call("resume", tmp_path / name, "--no-report")
         assert (tmp_path / name / "summary.json").is_file(), told.output
     released, held = (tmp_path / name / "signals.parquet" for name in ("released", "held"))
     assert released.read_bytes() == (tmp_path / "whole" / "signals.parquet").read_bytes()
@@ -225,13 +199,12 @@ def test_a_run_that_could_be_pushed_is_resumed_as_it_was_recorded_and_is_then_le
     if is_page:
         assert record["robot.f_P"][before].max() == whole["robot.f_P"][~before].max() == 4.0
         assert record["robot.f_P"][whole.time > 0.47].max() == 0.0
-        run_json = json.loads((tmp_path / "held" / "run.json").read_text())
-        assert run_json["inputs"]["from"] == "page"
-        assert run_json["inputs"]["until"] == pytest.approx(0.45, abs=0.02)
+        inputs_of_run = data_in(tmp_path / "held", "run")["inputs"]
+        assert (inputs_of_run["from"], inputs_of_run["until"]) == ("page", pytest.approx(0.45, abs=0.02))
 
 
 def test_a_hand_whose_page_is_gone_stays_and_its_sample_grows_old(tmp_path: Path):
-    person = kept_run("run", "flyer_robot_to_human", "--no-report", "--stop", "0.5")
+    person = kept_run("run", "flyer_robot_to_human", "--no-report", "--stop", "1")
     wanted = Record(person / "signals.parquet")
     sources: dict[str, ExternalSource] = {name: wanted.series(goal) for name, goal in GOALS.items()}
     sources["person.age"] = TimeSeries([0.0], [[0.02]], linear=False)

@@ -4,6 +4,7 @@ import contextlib
 import os
 import signal
 import sys
+from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
 
@@ -17,48 +18,40 @@ from handover.scenarios.execution.interruption import Interruption
 BLOCKS = ["HangsInPython", "HangsInNativeCode"][: 2 if sys.platform.startswith("linux") else 1]
 
 
-def interrupt(times: int, *, begun: bool = False) -> list[bool]:
-    asked: list[bool] = []
-    with Interruption() as interruption:
-        if begun:
+def interrupt(interruption: Interruption, times: int = 1) -> bool:
+    for _ in range(times):
+        os.kill(os.getpid(), signal.SIGINT)
+    return interruption.asked
+
+
+def swallow(interruption: Interruption) -> None:
+    with contextlib.suppress(KeyboardInterrupt):
+        interrupt(interruption)
+    interruption.begin()
+
+
+def twice_during_a_run(interruption: Interruption) -> None:
+    interruption.begin()
+    interrupt(interruption, 2)
+
+
+@pytest.mark.parametrize("act", [interrupt, swallow, twice_during_a_run])
+def test_an_interrupt_before_a_run_aborts_also_where_it_was_taken_for_a_failure_and_the_second_during_it(
+    act: Callable[[Interruption], object], capfd: pytest.CaptureFixture[str]
+):
+    with pytest.raises(SystemExit) as caught, Interruption() as interruption:
+        act(interruption)
+    assert caught.value.code == 130
+    assert capfd.readouterr().err.endswith("Aborted!\n")
+
+
+def test_during_a_run_the_first_interrupt_asks_and_without_one_nothing_changes():
+    before = signal.getsignal(signal.SIGINT)
+    for times in (0, 1):
+        with Interruption() as interruption:
             interruption.begin()
-        for _ in range(times):
-            os.kill(os.getpid(), signal.SIGINT)
-            asked.append(interruption.asked)
-    return asked
-
-
-def swallow() -> None:
-    with Interruption() as interruption:
-        with contextlib.suppress(KeyboardInterrupt):
-            os.kill(os.getpid(), signal.SIGINT)
-        interruption.begin()
-        raise AssertionError("the run began")
-
-
-def test_the_first_interrupt_before_a_run_aborts():
-    with pytest.raises(SystemExit) as caught:
-        interrupt(1)
-    assert caught.value.code == 130
-
-
-def test_what_is_said_takes_a_line_and_none_before(capfd: pytest.CaptureFixture[str]):
-    with pytest.raises(SystemExit):
-        interrupt(1)
-    assert capfd.readouterr().err == "Aborted!\n"
-
-
-def test_an_interrupt_that_was_taken_for_a_failure_aborts_all_the_same():
-    with pytest.raises(SystemExit) as caught:
-        swallow()
-    assert caught.value.code == 130
-
-
-def test_during_a_run_the_first_interrupt_asks_and_the_second_aborts():
-    assert interrupt(1, begun=True) == [True]
-    with pytest.raises(SystemExit) as caught:
-        interrupt(2, begun=True)
-    assert caught.value.code == 130
+            assert interrupt(interruption, times) is bool(times)
+        assert signal.getsignal(signal.SIGINT) is before
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="Windows has no such signal")
@@ -76,14 +69,6 @@ def test_a_terminal_that_is_closed_ends_a_run_unless_that_is_ignored(handler: si
         signal.signal(signal.SIGHUP, before)
 
 
-def test_without_an_interrupt_nothing_changes():
-    before = signal.getsignal(signal.SIGINT)
-    with Interruption() as interruption:
-        interruption.begin()
-    assert not interruption.asked
-    assert signal.getsignal(signal.SIGINT) is before
-
-
 def test_ctrl_c_while_units_are_built_leaves_nothing(tmp_path: Path):
     cache, out = tmp_path / "cache", tmp_path / "r"
     going = Command("run", "helix_handover", "--out", out, env={"HANDOVER_CACHE": str(cache)})
@@ -96,9 +81,7 @@ def test_ctrl_c_while_units_are_built_leaves_nothing(tmp_path: Path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "block", ["HangsInPython", "HangsInNativeCode"][: 2 if sys.platform.startswith("linux") else 1]
-)
+@pytest.mark.parametrize("block", BLOCKS)
 def test_a_second_ctrl_c_ends_a_run_whose_unit_hangs(block: str, tmp_path: Path):
     unit = build_block(f"support.scenarios.hanging_blocks:{block}", 3, tmp_path, step=Fraction(1, 10))
     hangs = tmp_path / "hangs"

@@ -1,28 +1,22 @@
 """A run's folder has its title, parameters, units and connections, so that a page can be made of it later."""
 
-import json
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import cast
 
 import pytest
-from click.testing import CliRunner
+from support.commands import call, data_in
 from support.cosim.native_units import native_fmu
 from support.failing_systems import failing_ssp
 from support.kept_runs import kept_run
 
 from handover.cosim.system.system import System
 from handover.fmus.build import cached
-from handover.scenarios.cli.command import main
 from handover.scenarios.free_flyer.push.impedance import FlyerImpedance
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
 from handover.scenarios.results.summary import parameter_rows
 from handover.scenarios.results.system_facts import describe_system
 from handover.scenarios.results.task import Task
-
-
-def read(out: Path, name: str) -> dict[str, Any]:
-    return json.loads((out / name).read_text())
 
 
 def test_units_of_parameters_are_written_as_one_reads_them():
@@ -33,7 +27,7 @@ def test_units_of_parameters_are_written_as_one_reads_them():
 
 def test_a_scenario_says_how_it_is_presented_and_wired():
     out = kept_run("run", "ir_grasp", "--no-report")
-    found, summary = read(out, "run.json"), read(out, "summary.json")
+    found, summary = data_in(out, "run"), data_in(out)
     assert found["title"] == IrGrasp.title
     assert found["headline"] == list(IrGrasp.headline)
     names = [name for name, _, _ in found["told_parameters"]]
@@ -55,13 +49,13 @@ def test_a_scenario_says_how_it_is_presented_and_wired():
 
 def test_an_ssp_says_the_same_and_a_unit_without_period_has_none(tmp_path: Path):
     file, out = failing_ssp(tmp_path, "gain"), tmp_path / "out"
-    done = CliRunner().invoke(main, ["run", str(file), "--out", str(out), "--adaptive", "1e-3", "--no-report"])
+    done = call("run", file, "--out", out, "--adaptive", "1e-3", "--no-report")
     assert done.exit_code == 0, done.output
-    found = read(out, "run.json")
+    found = data_in(out, "run")
     assert found["told_parameters"] == []
     assert file.name in found["title"]
     assert {unit["period"] for unit in found["system"]["units"]} == {None}
-    assert [u["name"] for u in read(out, "summary.json")["units"]] == [u["name"] for u in found["system"]["units"]]
+    assert [u["name"] for u in data_in(out)["units"]] == [u["name"] for u in found["system"]["units"]]
 
 
 def test_units_are_reported_as_their_sources_have_them_and_pictures_as_binary():

@@ -2,30 +2,27 @@
 
 import contextlib
 import hashlib
-import json
-import zipfile
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
+from support.commands import call, data_in, refusal
 from support.cosim.native_units import native_fmu
 from support.failing_systems import failing_ssp
-from support.wording import Wording
 
 import handover
 from handover.cosim.record.reader import Record
 from handover.cosim.ssp.writing import write_ssp
 from handover.cosim.system.system import System
 from handover.fmus.build import build_block
-from handover.scenarios.cli.command import main
 from handover.scenarios.execution.resume import InterruptedRun
 from handover.scenarios.results.run_folder import RunFolder
 
 
-def run(file: Path, *arguments: str | Path) -> Result:
-    return CliRunner().invoke(main, ["run", str(file), *(str(a) for a in arguments)])
+def run(file: object, *arguments: object) -> Result:
+    return call("run", file, *arguments)
 
 
 @pytest.fixture(scope="module")
@@ -49,9 +46,9 @@ def test_a_run_ends_at_the_file_s_stop_time_and_leaves_a_folder(spring: Path, tm
     record = Record(out / "signals.parquet")
     assert record.time[-1] == 2.0
     assert record["left.x"][-1] == 4.0
-    summary = json.loads((out / "summary.json").read_text())
+    summary = data_in(out)
     assert (summary["success"], summary["simulated_seconds"]) == (True, 2.0)
-    data = json.loads((out / "run.json").read_text())
+    data = data_in(out, "run")
     assert data["seed"] is None
     sha256 = hashlib.sha256((tmp_path / "springs.ssp").read_bytes()).hexdigest()
     assert (data["source"]["sha256"], data["source"]["stop"]) == (sha256, "2")
@@ -64,11 +61,13 @@ def test_a_run_ends_at_the_file_s_stop_time_and_leaves_a_folder(spring: Path, tm
     assert "seed" not in lead
 
 
-def test_stop_and_step_of_the_call_come_first(spring: Path, tmp_path: Path):
-    out = tmp_path / "out"
-    result = run(packed(spring, tmp_path, Fraction(2)), "--stop", "1/2", "--step", "1/4", "--no-report", "--out", out)
-    assert result.exit_code == 0, result.output
-    assert Record(out / "signals.parquet").time.tolist() == [0.0, 0.25, 0.5]
+def test_stop_and_step_of_the_call_come_first_and_the_stop_may_be_before_0(spring: Path, tmp_path: Path):
+    file = packed(spring, tmp_path, Fraction(2))
+    for stop, times in (("1/2", [0.0, 0.25, 0.5]), ("0", [-0.25, 0.0]), ("-1", [-1.25, -1.0])):
+        out = tmp_path / f"to {times[-1]}"
+        given = ("--start", str(times[0]), "--stop", stop, "--step", "1/4", "--no-report", "--out", out)
+        assert run(file, *given).exit_code == 0
+        assert Record(out / "signals.parquet").time.tolist() == times
 
 
 def test_a_run_starts_where_the_file_or_the_call_says(tmp_path: Path):
@@ -82,17 +81,6 @@ def test_a_run_starts_where_the_file_or_the_call_says(tmp_path: Path):
         record = Record(out / "signals.parquet")
         assert record.time.tolist() == record["clerk.now"].tolist() == times
         assert record["clerk.start"][0] == times[0]
-    assert run(file, "--start", "3", "--out", tmp_path / "none").exit_code == 2
-
-
-def test_a_unit_that_fails_ends_the_run_with_status_3_and_keeps_the_record(spring: Path, tmp_path: Path):
-    out = tmp_path / "out"
-    result = run(packed(spring, tmp_path, Fraction(2), tears=0.45), "--no-report", "--out", out)
-    assert result.exit_code == 3, result.output
-    assert "the spring tore" in result.output
-    summary = json.loads((out / "summary.json").read_text())
-    assert summary["reason"].startswith("a unit failed: left: fmi2DoStep at t = 0.5 s: RuntimeError: the spring tore")
-    assert Record(out / "signals.parquet").time[-1] == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize(("fmi", "more"), [(2, ("--no-report",)), (3, ())])
@@ -110,12 +98,12 @@ def test_a_unit_that_ends_the_simulation_ends_the_run_well(fmi: int, more: tuple
     assert sorted(said, key=result.output.index) == said  # the verdict comes before what takes seconds
     assert "to resume" not in result.output
     assert Record(out / "signals.parquet").time.tolist() == [0.0, 0.1, 0.2, 0.3]
-    summary = json.loads((out / "summary.json").read_text())
+    summary = data_in(out)
     assert (summary["success"], summary["complete"], summary["failure"]) == (True, True, None)
     assert (summary["reason"], summary["simulated_seconds"]) == (told, 0.3)
     ended = summary["ended"]
     assert (ended["instance"], ended["call"], ended["time"], ended["reached"]) == ("bad", f"fmi{fmi}DoStep", 0.2, 0.3)
-    assert CliRunner().invoke(main, ["resume", str(out)]).exit_code == 2  # complete
+    refusal("resume", out)  # it is complete
 
 
 def test_of_a_run_that_ended_where_it_began_nothing_is_drawn(spring: Path, tmp_path: Path):
@@ -128,82 +116,15 @@ def test_of_a_run_that_ended_where_it_began_nothing_is_drawn(spring: Path, tmp_p
     assert 'id="signals"' not in page
 
 
-@pytest.mark.parametrize(
-    ("stop", "given"),
-    [
-        pytest.param(None, (), id="no stop time"),
-        pytest.param(2, ("--unit", "a=1", "--seed", "3"), id="what is for scenarios"),
-        *(pytest.param(None, ("--step", step), id=f"step {step}") for step in ("0", "soon", "-1", "1/0", "1e400")),
-        pytest.param(2, ("-p", "left.tear=1", "-p", "tears=1"), id="unknown parameters"),
-        pytest.param(2, ("-p", "left.tears=soon"), id="no number"),
-        pytest.param(2, ("-p", "left.tears"), id="no value"),
-    ],
-)
-def test_what_cannot_be_run_is_refused_and_leaves_nothing(
-    spring: Path, tmp_path: Path, stop: int | None, given: tuple[str, ...], wording: Wording
-):
-    file = packed(spring, tmp_path, None if stop is None else Fraction(stop))
-    result = run(file, *given, "--out", tmp_path / "out")
-    assert result.exit_code == 2, result.output
-    wording.check(result.output)
-    assert not (tmp_path / "out").exists()
-
-
-def test_a_scenario_has_steps_of_its_own(tmp_path: Path, wording: Wording):
-    result = run(Path("ir_grasp"), "--step", "1", "--out", tmp_path / "out")
-    assert result.exit_code == 2, result.output
-    wording.check(result.output)
-
-
-def test_a_stop_time_may_be_0_or_before_it(spring: Path, tmp_path: Path):
-    for stop in ("0", "-1"):
-        out = tmp_path / f"to{stop}"
-        result = run(packed(spring, tmp_path), "--start", "-2", "--stop", stop, "--no-report", "--out", out)
-        assert result.exit_code == 0, result.output
-        assert Record(out / "signals.parquet").time[-1] == float(stop)
-        result = CliRunner().invoke(main, ["run", "ir_grasp", "--stop", stop])
-        assert (result.exit_code, f"{stop} s is not after" in result.output) == (2, True)
-
-
-@pytest.mark.parametrize(
-    ("old", "new"),
-    [
-        (b'name="left"', b'name="right"'),
-        (b"TearingSpring", b"Spring"),
-        (b'<ssd:Connector name="x"', b'<ssd:Connector name="y"'),
-        (b"</ssd:System>", b""),
-    ],
-    ids=["two of a name", "no such FMU", "no such variable", "no XML"],
-)
-def test_a_malformed_file_is_refused_in_one_line_and_nothing_is_written(
-    spring: Path, tmp_path: Path, old: bytes, new: bytes, wording: Wording
-):
-    file, out = tmp_path / "bad.ssp", tmp_path / "out"
-    with zipfile.ZipFile(packed(spring, tmp_path, Fraction(2))) as good, zipfile.ZipFile(file, "w") as bad:
-        for name in good.namelist():
-            content = good.read(name)
-            bad.writestr(name, content.replace(old, new) if name.endswith(".ssd") else content)
-    result = run(file, "--out", out)
-    assert result.exit_code == 2, result.output
-    (line,) = result.output.splitlines()
-    wording.check(line)
-    assert not out.exists()
-
-
-def test_a_file_that_is_not_there_is_reported(tmp_path: Path):
-    result = run(tmp_path / "missing.ssp")
-    assert result.exit_code == 2, result.output
-    assert result.output == f"Error: {tmp_path / 'missing.ssp'}: there is no such file\n"
-
-
-def test_p_sets_a_components_parameter_which_a_resumed_run_sets_again(spring: Path, tmp_path: Path):
+def test_a_unit_that_fails_ends_the_run_with_status_3_and_its_parameters_are_set_again(spring: Path, tmp_path: Path):
     file, out = packed(spring, tmp_path, Fraction(2), tears=5.0), tmp_path / "out"
-    result = run(
-        file, "-p", "left.tears=0.45", "-p", "right.tears=1.05", "--checkpoint", "0.2", "--no-report", "--out", out
-    )
-    assert result.exit_code == 3, result.output
-    assert "left: fmi2DoStep at t = 0.5 s: RuntimeError: the spring tore" in result.output
-    data = json.loads((out / "run.json").read_text())
+    given = ("-p", "left.tears=0.45", "-p", "right.tears=1.05", "--checkpoint", "0.2", "--no-report", "--out", out)
+    result = run(file, *given)
+    assert (result.exit_code, "the spring tore" in result.output) == (3, True), result.output
+    told = "a unit failed: left: fmi2DoStep at t = 0.5 s: RuntimeError: the spring tore"
+    assert data_in(out)["reason"].startswith(told)
+    assert Record(out / "signals.parquet").time[-1] == pytest.approx(0.5)
+    data = data_in(out, "run")
     assert data["source"]["parameters"] == ["left.tears=0.45", "right.tears=1.05"]
     assert ["right.tears", "1.05", "given start value"] in data["told_parameters"]
     with contextlib.ExitStack() as opened:

@@ -1,7 +1,6 @@
 """A run in a child process ends as one process would: by signals, by Ctrl-C in a terminal, when it is killed."""
 
 import contextlib
-import json
 import os
 import signal
 import subprocess
@@ -9,9 +8,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from support.commands import Command
+from support.commands import Command, data_in
 from support.failing_systems import failing_ssp, start, wait_until
-from support.processes import children, lives, recorded_rows, stopped, until
+from support.processes import children, recorded_rows, stopped, until
 
 from handover.cosim.record.reader import Record
 
@@ -47,20 +46,12 @@ def test_a_child_that_is_killed_leaves_a_whole_record(arguments: tuple[str | Pat
     assert status == 3
     assert errors.startswith("the run was killed at t = ")
     assert "gain.ssp failed: the run was killed" in shown
-    assert json.loads((tmp_path / "r" / "summary.json").read_text())["failure"]["kind"] == "killed"
+    assert data_in(tmp_path / "r")["failure"]["kind"] == "killed"
     assert Record(tmp_path / "r" / "signals.parquet").time[0] == 0.0
     assert list((tmp_path / "tmp").iterdir()) == []
 
 
-def test_a_parent_that_is_killed_takes_its_child_with_it(arguments: tuple[str | Path, ...], tmp_path: Path):
-    going = start(tmp_path, *arguments)
-    child = begun(going, tmp_path)
-    going.send_signal(signal.SIGKILL)
-    going.wait()
-    until(lambda: not lives(child))
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP])
 def test_a_signal_to_the_parent_ends_the_run_after_its_step(
     number: signal.Signals, arguments: tuple[str | Path, ...], tmp_path: Path
 ):

@@ -1,36 +1,29 @@
 """Outputs that feed nothing and are NaN or infinite: the run goes on, and its end tells them."""
 
-import json
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from click.testing import CliRunner, Result
+from support.commands import call, data_in
 from support.cosim.native_units import native_fmu
-from support.cosim.ssp_of import component, described, pack_ssp, system
 
 import handover
 from handover.cosim.record.reader import Record
 from handover.cosim.system.system import System
-from handover.scenarios.cli.command import main
 from handover.scenarios.results.not_finite import MAX_LINES, not_finite_lines, outputs_not_finite
 
 NAN_LINE = "unit gives_nan: y = NaN at t = 0.3 s, which no unit reads"
 
 
-def run(file: Path, out: Path, *arguments: str) -> Result:
-    return CliRunner().invoke(main, ["run", str(file), "--out", str(out), *arguments])
-
-
-@pytest.mark.parametrize("fmi", [2, 3])
-@pytest.mark.parametrize("coupling", [(), ("--algorithm", "fixed-point")], ids=["plan", "general"])
+@pytest.mark.parametrize(("fmi", "coupling"), [(2, ()), (3, ("--algorithm", "fixed-point"))])
 def test_a_run_ends_with_a_line_and_goes_on_until_then(tmp_path: Path, fmi: int, coupling: tuple[str, ...]):
-    result = run(native_fmu("gives_nan", fmi), tmp_path / "r", "--stop", "1", "--no-report", *coupling)
+    given = ("--stop", "1", "--no-report", "--out", tmp_path / "r")
+    result = call("run", native_fmu("gives_nan", fmi), *given, *coupling)
     assert result.exit_code == 0, result.output
     assert NAN_LINE in result.output.splitlines()
-    summary = json.loads((tmp_path / "r" / "summary.json").read_text())
+    summary = data_in(tmp_path / "r")
     assert summary["complete"]
     (told,) = summary["not_finite"]
     assert (told["instance"], told["output"], told["value"]) == ("gives_nan", "y", "NaN")
@@ -51,19 +44,11 @@ def test_page_and_result_have_the_line(tmp_path: Path):
     assert line in page.replace("\u202f", " ").replace("\u00a0", " ")
 
 
-def test_a_run_of_an_ssp_tells_them_too(tmp_path: Path):
-    parts = {"resources/unit.fmu": native_fmu("gives_nan", 2)}
-    file = pack_ssp(tmp_path / "a.ssp", described(system(component("bad"))), parts)
-    result = run(file, tmp_path / "r", "--stop", "1", "--no-report")
-    assert result.exit_code == 0, result.output
-    assert "unit bad: y = NaN at t = 0.3 s, which no unit reads" in result.output
-
-
 def test_a_run_with_finite_outputs_tells_nothing(tmp_path: Path):
-    result = run(native_fmu("gives_nan", 3), tmp_path / "r", "--stop", "0.2", "--no-report")
+    result = call("run", native_fmu("gives_nan", 3), "--stop", "0.2", "--no-report", "--out", tmp_path / "r")
     assert result.exit_code == 0, result.output
     assert "no unit reads" not in result.output
-    assert "not_finite" not in json.loads((tmp_path / "r" / "summary.json").read_text())
+    assert "not_finite" not in data_in(tmp_path / "r")
 
 
 def record(file: Path, **columns: list[float]) -> Path:
@@ -86,13 +71,7 @@ def test_of_an_array_the_first_entry_is_named_and_the_others_counted(tmp_path: P
         "unit a: y = infinity at t = 0.2 s, which feeds a unit, though no step followed",
         "unit a.b: p[2] = NaN at t = 0.1 s (another entry too), which no unit reads",
     ]
-
-
-def test_a_long_list_is_shortened(tmp_path: Path):
-    wired = System()
-    wired.add("a", native_fmu("gives_nan", 3))
     columns = {f"a.y{n}": [float("nan")] for n in range(MAX_LINES + 3)}
-    found = outputs_not_finite(record(tmp_path / "signals.parquet", time=[0.0], **columns), wired)
-    lines = not_finite_lines(found)
-    assert len(lines) == MAX_LINES + 1
+    lines = not_finite_lines(outputs_not_finite(record(file, time=[0.0], **columns), wired))
+    assert len(lines) == MAX_LINES + 1  # a long list is shortened
     assert lines[-1].startswith("3 more outputs are not finite")
