@@ -1,12 +1,9 @@
 """`import handover` takes next to no time, and what it exports is there, documented, and typed."""
 
 import ast
-import builtins
 import inspect
-import re
 import subprocess
 import sys
-from operator import attrgetter
 from pathlib import Path
 
 import handover
@@ -28,20 +25,11 @@ def test_importing_it_loads_nothing_else():
 
 
 def test_all_that_it_exports_can_be_loaded_and_is_documented():
+    assert not hasattr(handover, "rum")
     for name in handover.__all__:
         found = getattr(handover, name)
         assert inspect.getdoc(found), name
         assert found.__name__ == name
-
-
-def test_all_errors_of_its_own_that_are_documented_can_be_caught():
-    documented: set[str] = set()
-    for name in ("run", "sweep", "open", "environment", "load", "Run.report", "Campaign.report", "Session.step"):
-        text = inspect.getdoc(attrgetter(name)(handover)) or ""
-        documented |= set(re.findall(r"\b([A-Z]\w+): ", text.partition("Raises:")[2]))
-    assert {name for name in documented if not hasattr(builtins, name)} == {
-        "ClusterLost", "InvalidInput", "RecordNotWritten", "UnitFailure",
-    } <= set(handover.__all__)  # fmt: skip
 
 
 def test_type_checkers_see_what_is_loaded():
@@ -52,10 +40,6 @@ def test_type_checkers_see_what_is_loaded():
     assert set(declared) == set(handover.__all__)
     for name, module in declared.items():
         assert getattr(handover, name) is getattr(sys.modules.get(module) or __import__(module, fromlist=[name]), name)
-
-
-def test_other_names_are_no_attributes():
-    assert not hasattr(handover, "rum")
 
 
 def test_importing_results_leaves_the_users_matplotlib_alone():

@@ -44,25 +44,14 @@ def test_signals_are_arrays_by_name(run: handover.Run):
         signals["scene.p_WHH"]
 
 
-def test_signals_become_a_table(run: handover.Run):
+def test_signals_become_a_table(run: handover.Run, monkeypatch: pytest.MonkeyPatch):
     table = run.signals.to_pandas()
     assert table.index.name == "time"
     assert table["scene.p_WH[2]"].tolist() == run.signals["scene.p_WH"][:, 1].tolist()
     assert table.attrs["units"]["scene.p_WH[2]"] == "m"
-
-
-def test_without_pandas_one_line_says_what_to_install(run: handover.Run, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(ImportError, match=r"^to_pandas needs pandas: python -m pip install pandas$"):
         run.signals.to_pandas()
-
-
-def test_an_element_of_a_signal_is_drawn_by_its_name_in_the_record(run: handover.Run):
-    (axes,) = run.plot("scene.p_WH[2]").axes
-    assert axes.get_ylabel() == "scene.p_WH[2] (m)"
-    np.testing.assert_array_equal(axes.lines[0].get_ydata(), run.signals["scene.p_WH"][:, 1])
-    with pytest.raises(KeyError, match=r"no signal 'scene\.p_WH\[3\]'"):
-        run.plot("scene.p_WH[3]")
 
 
 def test_plots_have_names_and_units_at_their_axes(run: handover.Run):
@@ -76,20 +65,24 @@ def test_plots_have_names_and_units_at_their_axes(run: handover.Run):
     assert "reach" in [label.get_text() for label in below.get_yticklabels()]
     assert figure._repr_png_().startswith(b"\x89PNG")  # type: ignore
     assert not plt.get_fignums()
-
-
-def test_plots_go_into_axes_of_ones_own(run: handover.Run):
+    (axes,) = run.plot("scene.p_WH[2]").axes
+    assert axes.get_ylabel() == "scene.p_WH[2] (m)"
+    np.testing.assert_array_equal(axes.lines[0].get_ydata(), run.signals["scene.p_WH"][:, 1])
     figure, axes = plt.subplots()
     assert run.plot("scene.yaw", axes=axes) is figure
     assert axes.get_ylabel() == "scene.yaw (rad)"
     plt.close(figure)
-
-
-def test_a_plot_of_nothing_is_refused(run: handover.Run):
-    with pytest.raises(KeyError, match=r"no signal 'scene.yav': did you mean scene.yaw.*; no signal 'reflex.fase'"):
-        run.plot("scene.yav", "reflex.fase")
-    with pytest.raises(ValueError, match="no signal is named"):
-        run.plot()
+    for names, error, told in (
+        (["scene.p_WH[3]"], KeyError, r"no signal 'scene\.p_WH\[3\]'"),
+        (
+            ["scene.yav", "reflex.fase"],
+            KeyError,
+            "no signal 'scene.yav': did you mean scene.yaw.*; no signal 'reflex.f",
+        ),
+        ([], ValueError, "no signal is named"),
+    ):
+        with pytest.raises(error, match=told):
+            run.plot(*names)
 
 
 def test_replay_and_report_are_pages(tmp_path: Path):
@@ -116,27 +109,32 @@ def test_a_notebook_shows_verdict_headline_and_plots_without_what_a_unit_did_not
     assert "object at 0x" not in repr(run)
 
 
-def test_a_run_of_another_version_is_shown_without_plots(grasp_without_reflex: Path):
-    described = json.loads((grasp_without_reflex / "run.json").read_text())
-    described["parameters"]["colour"] = "red"
-    (grasp_without_reflex / "run.json").write_text(json.dumps(described))
+def test_a_strangers_run_of_another_version_is_shown_without_plots_and_steers_no_terminal(grasp_without_reflex: Path):
+    change(grasp_without_reflex / "run.json", parameters={"colour": "red"})
     run = handover.Run(grasp_without_reflex)
     html = run._repr_html_()  # type: ignore
     assert "succeeded</span>" in html
     assert "the figures over time could not be drawn: InvalidParameter" in html
     with pytest.raises(handover.InvalidInput, match="colour"):
         run.replay()
+    for name in ("run.json", "summary.json"):
+        change(grasp_without_reflex / name, scenario="a\x1b]0;b\u202e")
+    assert "<run of a\ufffd]0;b\ufffd: " in repr(handover.load(grasp_without_reflex))
+    (grasp_without_reflex / "signals.parquet").write_bytes(b"")
+    with pytest.raises(handover.InvalidInput, match=r"signals\.parquet is damaged"):
+        handover.Run(grasp_without_reflex)._repr_html_()  # type: ignore
 
 
-def test_a_notebook_shows_a_system_as_its_graph():
-    html = handover.system("helix_handover")._repr_html_()  # type: ignore
-    assert html.startswith("<svg")
-    for text in ("camera", "StereoCamera", "FMI 3, 100 ms, sampled", "arm → hand", "p_WG (real [3] m)"):
-        assert text in html
-    assert html.count("<rect") == 5
+def change(file: Path, **changes: object) -> None:
+    file.write_text(json.dumps(json.loads(file.read_text()) | changes))
 
 
-def test_a_notebook_shows_a_unit_as_its_ports():
+def test_a_notebook_shows_a_system_as_its_graph_and_a_unit_as_its_ports():
+    graph = handover.system("ir_grasp")._repr_html_()  # type: ignore
+    assert graph.startswith("<svg")
+    for text in ("reflex", "IrReflex", "FMI 3, 15 ms, sampled", "scene → reflex", "p_WH_cmd (real [2] m)"):
+        assert text in graph
+    assert graph.count("<rect") == 2
     html = handover.describe("IrReflex")._repr_html_()  # type: ignore
     for text in ("<b>Inputs", "<b>Outputs", "<b>Parameters", "p_WH_cmd", "real [2]", "at least 1", ">reflex<"):
         assert text in html
@@ -145,20 +143,11 @@ def test_a_notebook_shows_a_unit_as_its_ports():
 
 
 def test_progress_is_a_bar():
-    assert bar_html(2.0, 5.0, "2 of 5 <s>").startswith("<progress value='2' max='5'")
-    assert "&lt;s&gt;" in bar_html(2.0, 5.0, "2 of 5 <s>")
+    bar = bar_html(2.0, 5.0, "2 of 5 <s>")
+    assert bar.startswith("<progress value='2' max='5'")
+    assert "&lt;s&gt;" in bar
 
 
 def test_the_folder_of_nothing_is_refused(tmp_path: Path):
     with pytest.raises(handover.InvalidInput, match="the folder of neither a run"):
         handover.load(tmp_path)
-
-
-def test_what_a_strangers_run_says_steers_no_terminal(grasp_without_reflex: Path):
-    for name in ("run.json", "summary.json"):
-        content = json.loads((grasp_without_reflex / name).read_text())
-        (grasp_without_reflex / name).write_text(json.dumps({**content, "scenario": "a\x1b]0;b\u202e"}))
-    assert "<run of a\ufffd]0;b\ufffd: " in repr(handover.load(grasp_without_reflex))
-    (grasp_without_reflex / "signals.parquet").write_bytes(b"")
-    with pytest.raises(handover.InvalidInput, match=r"signals\.parquet is damaged"):
-        handover.Run(grasp_without_reflex)._repr_html_()  # type: ignore
