@@ -15,7 +15,7 @@ from handover.scenarios.campaign import local_cluster
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
 
-GIVEN: dict[str, Any] = {"seeds": 2, "strategy": ["blind", "reflex"], "standoff": 0.06, "stop": 0.5}
+GIVEN: dict[str, Any] = {"seeds": 2, "strategy": ["blind", "reflex"], "standoff": 0.06}
 PROGRAM = """
 import handover
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from handover.cosim.blocks.ports import output, parameter
 from handover.cosim.blocks.units import Metre, Second
-from support.cosim.master_blocks import Stateless
+from support.cosim.master_blocks import Plain
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,7 +22,7 @@ class Outputs:
     x: Metre = output("stretch")
 
 
-class TearingSpring(Stateless):
+class TearingSpring(Plain):
     """Stretches by x = t^2 until it tears."""
 
     def __init__(self, params: Params) -> None:
