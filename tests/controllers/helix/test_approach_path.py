@@ -44,9 +44,7 @@ def test_the_gripper_does_not_turn_back_once_it_is_over_the_ball():
 
 
 @pytest.mark.parametrize(("excess", "height"), [(-0.3, 0.0), (0.1, 0.02), (1.0, 0.05)])
-def test_a_tilted_gripper_stays_above(excess: float, height: float):
+def test_a_tilted_gripper_stays_above_but_for_a_standoff_of_nothing(excess: float, height: float):
     np.testing.assert_allclose(course(np.array([0.15, 0.0, 0.1]), P_WO, excess)[-1], [0.0, 0.0, height], atol=1e-6)
-
-
-def test_without_standoff_the_goal_is_the_next_place():
-    np.testing.assert_array_equal(next_place(P_WO - ABOVE, P_WO, P_WO, standoff=0.0, over=0.05, excess=1.0), P_WO)
+    at_once = next_place(P_WO - ABOVE, P_WO, P_WO, standoff=0.0, over=0.05, excess=excess)
+    np.testing.assert_array_equal(at_once, P_WO)

@@ -1,12 +1,23 @@
-from dataclasses import fields, replace
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
-from support.controllers.vision_scenes import AWAY, PLACES, anywhere, distances, hanging, look, over_ball, reaching
+from support.controllers.vision_scenes import (
+    AWAY,
+    PLACES,
+    anywhere,
+    distances,
+    hanging,
+    look,
+    over_ball,
+    reaching,
+    squared,
+)
+from support.wording import Wording
 
-from handover.controllers.helix.vision.handover_vision import Detector, HandoverVision, Inputs, Outputs, Params
+from handover.controllers.helix.vision.handover_vision import HandoverVision, Inputs, Params
 from handover.controllers.helix.vision.vision_parameters import InvalidVisionParameters
-from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.geometry import InvalidCalibration
 from handover.cosim.blocks.ports import BLACK_1280X720, Floats
 from handover.plants.helix.cameras.stereo_camera import Params as CameraParams
@@ -18,69 +29,44 @@ def camera() -> StereoCamera:
     return StereoCamera(CameraParams())
 
 
-@pytest.fixture(scope="module")
-def one_eyed() -> StereoCamera:
-    return StereoCamera(CameraParams(cover_right_until=1e9))
-
-
-def test_calibration_is_the_camera_s():
-    ours, theirs = Params(), CameraParams()
-    names = [f.name for f in fields(Params) if f.name.endswith(("_left", "_right", "_third"))]
-    assert len(names) == 13
-    for name in [*names, "apothem", "marker", "rings", "ball_radius"]:
-        np.testing.assert_array_equal(getattr(ours, name), getattr(theirs, name))
-
-
-def test_every_output_feeds_through_from_all_pictures():
-    d = describe(HandoverVision)
-    assert d.feedthrough == {v.name: ("left", "right", "third") for v in d.outputs}
-
-
 def test_accuracy_over_many_poses_and_covariances_that_tell_the_errors(camera: StereoCamera):
-    rng = np.random.default_rng(7)
-    errors: list[Floats] = []
-    squares: list[list[float]] = []
-    both: list[bool] = []
-    for _ in range(16):
+    rng, errors, squares, both = np.random.default_rng(7), list[Floats](), list[Floats](), list[bool]()
+    for _ in range(12):
         u, vision = anywhere(rng), HandoverVision(Params())
         look(camera, vision, u)
         y = look(camera, vision, u)
         assert y.seen_O
         if y.seen_R:  # a hand may hide the ring
             errors.append(distances(y, u))
+            squares.append(squared(y, u))
             both.append(bool(np.trace(y.cov_O) < 0.002**2))  # the arm may hide the ball from one camera
-            pairs = [(y.p_WO_meas - u.p_WO, y.cov_O), (y.p_WR_meas - u.p_WR, y.cov_R), (y.p_WG_meas - u.p_WG, y.cov_G)]
-            squares.append([float(e @ np.linalg.solve(cov, e)) for e, cov in pairs])
     _, wrist, gripper = 1e3 * np.sqrt(np.mean(np.square(errors), axis=0))
     balls = np.array(errors)[:, 0]
-    ball = 1e3 * np.sqrt(np.mean(balls[both] ** 2))
-    assert len(errors) >= 15
-    assert sum(both) >= 13
-    assert ball < 0.15
+    assert len(errors) >= 11
+    assert sum(both) >= 9
+    assert 1e3 * np.sqrt(np.mean(balls[both] ** 2)) < 0.15
     assert balls.max() < 0.01
     assert wrist < 0.6
     assert gripper < 1.25
     mean = np.mean(squares, axis=0)  # 3 where the covariances were exact
-    assert np.all(mean > 0.2)
-    assert np.all(mean < 9.0)
+    assert np.all((mean > 0.2) & (mean < 9.0))
 
 
-def seen_with(covered: tuple[str, ...], has_third: bool, detector: Detector = Detector.JOINT) -> Floats:
+def seen_with(covered: tuple[str, ...], has_third: bool) -> Floats:
     """Return errors of ball and wrist in 6 scenes, shape (6, 2), m; NaN where one is not seen."""
     until = [1e9 if side in covered else 0.0 for side in ("left", "right")]
     camera = StereoCamera(CameraParams(has_third=has_third, cover_left_until=until[0], cover_right_until=until[1]))
     rng, errors = np.random.default_rng(5), np.full((6, 2), np.nan)
     for e in errors:
         u = anywhere(rng)
-        y = look(camera, HandoverVision(Params(has_third=has_third, detector=detector)), u)
+        y = look(camera, HandoverVision(Params(has_third=has_third)), u)
         ball, wrist, _ = distances(y, u)
         e[:] = ball if y.seen_O else np.nan, wrist if y.seen_R else np.nan
     return errors
 
 
-@pytest.mark.parametrize("covered", ["left", pytest.param("right", marks=pytest.mark.slow)])
-def test_a_third_camera_makes_up_for_a_covered_one(covered: str):
-    alone, beside = seen_with((covered,), has_third=False), seen_with((covered,), has_third=True)
+def test_a_third_camera_makes_up_for_a_covered_one():
+    alone, beside = seen_with(("left",), has_third=False), seen_with(("left",), has_third=True)
     assert np.count_nonzero(np.isfinite(beside).all(axis=1)) >= 5
     ball, wrist = np.nanmedian(beside, axis=0)
     ball_alone, wrist_alone = np.nanmedian(alone, axis=0)
@@ -95,14 +81,6 @@ def test_a_third_camera_alone_sees_ball_and_ring_where_the_arm_does_not_hide_the
     assert np.nanmax(errors) < 0.015
 
 
-@pytest.mark.slow
-def test_the_published_detector_takes_the_ball_by_the_two_cameras_that_see_it():
-    assert np.isnan(seen_with(("left",), has_third=False, detector=Detector.PUBLISHED)[:, 0]).all()
-    balls = seen_with(("left",), has_third=True, detector=Detector.PUBLISHED)[:, 0]
-    assert np.count_nonzero(np.isfinite(balls)) >= 5
-    assert np.nanmedian(balls) < 0.005
-
-
 def test_without_a_third_camera_its_picture_does_not_count():
     y = StereoCamera(CameraParams(has_third=True)).step(0.0, 1 / 30, hanging("front"))
     with_third, pair = Inputs(left=y.left, right=y.right, third=y.third), Inputs(left=y.left, right=y.right)
@@ -113,68 +91,63 @@ def test_without_a_third_camera_its_picture_does_not_count():
 @pytest.mark.parametrize("place", PLACES)
 def test_ball_and_ring_are_seen_at_every_place(place: str):
     camera = StereoCamera(CameraParams(seed=1))
-    for u in (hanging(place), reaching(place, 0.0), reaching(place, 1.0)):
+    for u in (hanging(place), reaching(place, 1.0)):
         y = look(camera, HandoverVision(Params()), u)
         assert (y.seen_O, y.seen_R) == (True, True)
         assert np.all(distances(y, u) < [0.0005, 0.0015, 0.0025])
 
 
-def test_one_camera_is_enough_but_says_that_it_knows_depth_less(camera: StereoCamera, one_eyed: StereoCamera):
-    for place in ("front-left", "left"):
-        u, vision = hanging(place), HandoverVision(Params())
-        y, both = look(one_eyed, vision, u), look(camera, HandoverVision(Params()), u)
-        assert (y.seen_O, y.seen_R) == (True, True)
-        assert np.all(distances(y, u) < 0.02)
-        away = u.p_WO - CameraParams().p_WC_left
-        away = away / np.linalg.norm(away)
-        assert away @ y.cov_O @ away > 50.0 * (away @ both.cov_O @ away)
-        assert np.trace(y.cov_R) > 4.0 * np.trace(both.cov_R)
+def test_one_camera_is_enough_but_says_that_it_knows_depth_less(camera: StereoCamera):
+    u = hanging("front-left")
+    one_eyed = StereoCamera(CameraParams(cover_right_until=1e9))
+    y, both = (look(c, HandoverVision(Params()), u) for c in (one_eyed, camera))
+    assert (y.seen_O, y.seen_R) == (True, True)
+    assert np.all(distances(y, u) < 0.02)
+    away = u.p_WO - CameraParams().p_WC_left
+    away = away / np.linalg.norm(away)
+    assert away @ y.cov_O @ away > 50.0 * (away @ both.cov_O @ away)
+    assert np.trace(y.cov_R) > 4.0 * np.trace(both.cov_R)
 
 
-def test_a_ball_out_of_view_is_not_seen_and_its_place_repeated(camera: StereoCamera):
+def test_what_is_out_of_view_is_not_seen_and_its_place_repeated(camera: StereoCamera):
     vision, u = HandoverVision(Params()), hanging("left")
     first = look(camera, vision, u)
-    y = look(camera, vision, replace(u, p_WO=AWAY, p_WH=AWAY))
-    assert (first.seen_O, y.seen_O, y.seen_R) == (True, False, True)
-    np.testing.assert_array_equal(y.p_WO_meas, first.p_WO_meas)
-    assert y.cov_O[0, 0] >= 1.0
-
-
-def test_without_markers_the_ring_is_not_seen_and_its_place_repeated(camera: StereoCamera):
-    vision, u = HandoverVision(Params()), hanging("left")
-    first = look(camera, vision, u)
-    y = look(camera, vision, replace(u, p_WR=AWAY))
-    assert (first.seen_R, y.seen_R, y.seen_O) == (True, False, True)
-    np.testing.assert_array_equal(y.p_WR_meas, first.p_WR_meas)
-    np.testing.assert_array_equal(y.p_WG_meas, first.p_WG_meas)
-    assert y.cov_R[0, 0] >= 1.0
-    assert y.cov_G[0, 0] >= 1.0
+    assert (first.seen_O, first.seen_R) == (True, True)
+    for away, seen, names in (
+        ({"p_WO": AWAY, "p_WH": AWAY}, (False, True), ("p_WO_meas", "cov_O")),
+        ({"p_WR": AWAY}, (True, False), ("p_WR_meas", "cov_R", "p_WG_meas", "cov_G")),
+    ):
+        y = look(camera, vision, replace(u, **away))
+        assert (y.seen_O, y.seen_R) == seen
+        for place, covariance in zip(names[::2], names[1::2], strict=True):
+            np.testing.assert_array_equal(getattr(y, place), getattr(first, place))
+            assert getattr(y, covariance)[0, 0] >= 1.0
 
 
 def test_fingers_before_the_ball_hardly_shift_it():
     """Over many looks, each at another pose and with other noise: single ones differ by the noise alone."""
-    camera, rng = StereoCamera(CameraParams(seed=1)), np.random.default_rng(1)
-    errors: list[float] = []
-    squares: list[float] = []
-    for _ in range(40):
+    camera, rng, errors, squares = (
+        StereoCamera(CameraParams(seed=1)),
+        np.random.default_rng(1),
+        list[float](),
+        list[float](),
+    )
+    for _ in range(24):
         u = over_ball(rng)
         y = look(camera, HandoverVision(Params()), u)
         assert y.seen_O
-        e = y.p_WO_meas - u.p_WO
-        errors.append(1e3 * float(np.linalg.norm(e)))
-        squares.append(float(e @ np.linalg.solve(y.cov_O, e)))
-    rms, most, share = np.sqrt(np.mean(np.square(errors))), max(errors), np.percentile(errors, 95)
-    assert rms < 0.15
-    assert share < 0.3
-    assert most < 1.0
+        errors.append(1e3 * float(distances(y, u)[0]))
+        squares.append(float(squared(y, u)[0]))
+    assert np.sqrt(np.mean(np.square(errors))) < 0.15
+    assert np.percentile(errors, 95) < 0.3
+    assert max(errors) < 1.0
     assert 1.0 < np.mean(squares) < 4.5  # 3 where the covariances were exact
 
 
-@pytest.mark.parametrize("start", ["front", *(pytest.param(s, marks=pytest.mark.slow) for s in ("front-left", "left"))])
-def test_finds_again_what_jumped_out_of_its_region(start: str):
+def test_finds_again_what_jumped_out_of_its_region():
     """The region around where the ball was may show a part of it, or one camera's may."""
     camera, u = StereoCamera(CameraParams(seed=2)), reaching("back-left", 0.0)
-    for _ in range(3):
+    for start in ("front", "front-left", "left"):
         vision = HandoverVision(Params())
         look(camera, vision, hanging(start))
         y = look(camera, vision, u, t=1.0)
@@ -204,39 +177,16 @@ def test_pictures_of_different_scenes_do_not_give_a_ball_between_them(camera: St
     assert not y.seen_O or min(near) < 0.03
 
 
-def test_continues_bit_identically_from_a_state(camera: StereoCamera):
-    vision = HandoverVision(Params())
-    look(camera, vision, hanging("left"))
-    state = vision.get_state()
-    pictures = [camera.step(0.0, 1 / 30, u) for u in (hanging("left"), reaching("left", 0.0), hanging("front"))]
-    other = HandoverVision(Params())
-    other.set_state(state)
-    for y in pictures:
-        a, b = (v.step(0.0, 1 / 30, Inputs(left=y.left, right=y.right)) for v in (vision, other))
-        for f in fields(Outputs):
-            np.testing.assert_array_equal(getattr(a, f.name), getattr(b, f.name))
-    assert vision.get_state() == other.get_state()
-
-
-def test_outputs_leave_the_state_alone(camera: StereoCamera):
-    vision = HandoverVision(Params())
-    state, y = vision.get_state(), camera.outputs(0.0, hanging("left"))
-    assert vision.outputs(0.0, Inputs(left=y.left, right=y.right)).seen_O
-    assert vision.get_state() == state
-
-
-def test_bad_calibration_is_refused():
-    with pytest.raises(InvalidCalibration, match="'right': q_WC"):
-        HandoverVision(Params(q_WC_right=np.array([0.5, 0.0, 0.0, 0.0])))
-    with pytest.raises(InvalidCalibration, match="'left': intrinsics"):
-        HandoverVision(Params(intrinsics_left=np.array([-907.0, 907.0, 640.0, 360.0])))
-
-
-def test_parameters_out_of_range_are_refused_all_at_once():
-    with pytest.raises(InvalidVisionParameters) as caught:
-        HandoverVision(Params(rings=3, corner_noise=0.0))
-    assert len(caught.value.faults) == 2
-    assert "rings: 3 is out of range: from 1 to 2" in str(caught.value)
+def test_bad_calibration_and_parameters_out_of_range_are_refused(wording: Wording):
+    bad: tuple[dict[str, Any], ...] = (
+        {"q_WC_right": np.array([0.5, 0.0, 0.0, 0.0])},
+        {"intrinsics_left": np.array([-907.0, 907.0, 640.0, 360.0])},
+        {"rings": 3, "corner_noise": 0.0},
+    )
+    for values in bad:
+        with pytest.raises((InvalidCalibration, InvalidVisionParameters)) as caught:
+            HandoverVision(Params(**values))
+        wording.check(caught.value)
 
 
 def test_of_three_pairs_one_is_looked_at_and_its_measurement_repeated(camera: StereoCamera):

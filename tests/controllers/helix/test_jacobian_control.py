@@ -1,3 +1,5 @@
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -27,10 +29,9 @@ def within(q: Floats) -> bool:
     return bool(np.all(q_DL >= LIMITS.LB) and np.all(q_DL <= LIMITS.UB))
 
 
-def go(q_sys: Floats, q_est: Floats, X_goal: Floats, X_meas: Floats) -> ControlStep:
-    return control_step(
-        q_sys, q_est, X_goal, X_meas, K=K, limits=LIMITS, epsilon_control=0.005, N_max_iter=20, d_gripper=D_GRIPPER
-    )
+def go(q_sys: Floats, q_est: Floats, X_goal: Floats, X_meas: Floats, N_max_iter: int = 20) -> ControlStep:
+    most: dict[str, Any] = {"epsilon_control": 0.005, "N_max_iter": N_max_iter}
+    return control_step(q_sys, q_est, X_goal, X_meas, K=K, limits=LIMITS, d_gripper=D_GRIPPER, **most)
 
 
 @given(states)
@@ -43,29 +44,20 @@ def test_limits_are_kept_exactly_and_signs_stay(q: Floats):
     touched = ~np.isclose(K_inv * K, 1.0)
     np.testing.assert_array_equal(cropped[~touched], q[~touched])
     np.testing.assert_allclose(K_inv[touched], 0.01 / K[touched])
-
-
-@given(states)
-def test_a_cropped_state_is_left_alone(q: Floats):
-    cropped, _ = keep_limits(q, 1 / K, LIMITS)
     again, K_inv = keep_limits(cropped, 1 / K, LIMITS)
-    np.testing.assert_array_equal(again, cropped)
-    np.testing.assert_array_equal(K_inv, 1 / K)
+    np.testing.assert_array_equal([again, K_inv], [cropped, 1 / K])
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_the_component_of_greater_magnitude_is_cropped(sign: float):
+def test_the_component_of_greater_magnitude_is_cropped_and_two_that_exceed_the_bound_are_scaled_alike(sign: float):
     q = Q_CALIB + np.array([0, 0, 0, sign * 1.8, -0.5, 0, 0.3, sign * 1.7, 0])
     cropped, K_inv = keep_limits(q, 1 / K, LIMITS)
     assert cropped[3] == pytest.approx(sign * np.sqrt((np.pi / 2) ** 2 - 0.25))
     assert cropped[7] == pytest.approx(sign * np.sqrt((np.pi / 2) ** 2 - 0.09))
     assert (cropped[4], cropped[6]) == (-0.5, 0.3)
     np.testing.assert_allclose(K_inv * K, [1, 1, 1, 0.01, 1, 1, 1, 0.01, 1])
-
-
-def test_two_components_that_each_exceed_the_bound_are_scaled_alike():
-    cropped, K_inv = keep_limits(Q_CALIB + np.array([1.2, -0.9, 0, 0, 0, 0, 0, 0, 0]), 1 / K, LIMITS)
-    np.testing.assert_allclose(cropped[:2], np.pi / 4 * np.array([0.8, -0.6]))
+    cropped, K_inv = keep_limits(Q_CALIB + np.array([1.2, sign * 0.9, 0, 0, 0, 0, 0, 0, 0]), 1 / K, LIMITS)
+    np.testing.assert_allclose(cropped[:2], np.pi / 4 * np.array([0.8, sign * 0.6]))
     np.testing.assert_allclose(K_inv * K, [0.01, 0.01, 1, 1, 1, 1, 1, 1, 1])
 
 
@@ -80,9 +72,8 @@ def test_the_blend_keeps_the_grippers_length():
 
 @pytest.mark.parametrize("alpha", [0.4, 1.0])
 def test_targets_are_reached_from_hanging_poses_within_the_limits(alpha: float):
-    rng = np.random.default_rng(1)
-    reached = 0
-    for _ in range(200):
+    rng, reached = np.random.default_rng(1), 0
+    for _ in range(100):
         q, _ = keep_limits(Q_CALIB + rng.normal(size=9) * np.tile([0.1, 0.1, 0.005], 3), 1 / K, LIMITS)
         bend, phi = 0.7 * np.sqrt(rng.uniform(size=3)) * LIMITS.UB[::2], rng.uniform(-np.pi, np.pi, 3)
         l = rng.uniform(LIMITS.LB[1::2], LIMITS.UB[1::2])
@@ -95,14 +86,12 @@ def test_targets_are_reached_from_hanging_poses_within_the_limits(alpha: float):
         assert got.error == pytest.approx(missed, abs=1e-15)
         assert got.converged == (missed < 0.005)
         reached += got.converged
-    assert reached >= 190
+    assert reached >= 95
 
 
 def test_estimate_and_command_move_alike():
-    q_sys, q_est = (
-        Q_CALIB + np.array([0.3, 0, 0, 0.5, 0, 0, 0, 0, 0]),
-        Q_CALIB + np.array([0.2, 0, 0, 0.3, 0, 0, 0, 0, 0]),
-    )
+    bent = np.array([0.1, 0, 0, 0.2, 0, 0, 0, 0, 0])
+    q_sys, q_est = Q_CALIB + 2.5 * bent, Q_CALIB + 1.5 * bent
     X = forward_kinematics(q_est, D_GRIPPER)
     got = go(q_sys, q_est, X + np.array([0.02, 0.01, -0.01, 0.02, 0.01, -0.01]), X)
     np.testing.assert_allclose(got.q_est - q_est, got.q_sys - q_sys, atol=1e-14)
@@ -112,14 +101,8 @@ def test_estimate_and_command_move_alike():
 def test_out_of_reach_the_best_iterate_comes_back_and_says_so():
     X = forward_kinematics(Q_CALIB, D_GRIPPER)
     X_goal = X + np.array([0.8, 0, 0, 0.8, 0, 0])
-    got = go(Q_CALIB, Q_CALIB, X_goal, X)
+    *shorter, got = (go(Q_CALIB, Q_CALIB, X_goal, X, n) for n in range(1, 21))
     assert not got.converged
     assert within(got.q_sys)
-    shorter = [
-        control_step(
-            Q_CALIB, Q_CALIB, X_goal, X, K=K, limits=LIMITS, epsilon_control=0.005, N_max_iter=n, d_gripper=D_GRIPPER
-        ).error
-        for n in range(1, 20)
-    ]
-    assert got.error == pytest.approx(min([*shorter, got.error]))
+    assert got.error == pytest.approx(min(g.error for g in [*shorter, got]))
     assert got.error < np.linalg.norm(X_goal - X)

@@ -1,5 +1,7 @@
 """Parts of the visual servo by themselves: averaged commands, response, damped steps, reach."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.optimize import NonlinearConstraint, minimize
@@ -25,18 +27,16 @@ def test_a_step_of_the_command_becomes_a_ramp_as_long_as_the_average():
     np.testing.assert_allclose(given, [min(0.1 * n, 1.0) for n in range(16)], atol=1e-12)
 
 
-@pytest.mark.parametrize(("duration", "most"), [(1.0, 0.02), (0.0, 0.9)])
-def test_an_averaged_command_excites_no_swing_of_that_period(duration: float, most: float):
+@pytest.mark.parametrize(("duration", "least", "most"), [(1.0, 0.0, 0.02), (0.0, 0.9, 1.1)])
+def test_an_averaged_command_excites_no_swing_of_that_period(duration: float, least: float, most: float):
     """x'' = w^2 (u - x) with a period of 1 s, and a step of u: without the average it swings by as much as the step."""
-    shaper, w, x, v, dt = Shaper(duration, np.zeros(9)), 2 * np.pi, 0.0, 0.0, 0.002
-    swing: list[float] = []
-    for n in range(3000):
+    shaper, w, x, v, dt, swing = Shaper(duration, np.zeros(9)), 2 * np.pi, 0.0, 0.0, 0.002, 0.0
+    for n in range(1500):
         shaper.advance(n * dt, np.ones(9))
         v += dt * w**2 * (float(shaper.q[0]) - x)
         x += dt * v
-        if n * dt > 1.5:
-            swing.append(abs(x - 1.0))
-    assert max(swing) < most if duration else max(swing) > most
+        swing = max(swing, abs(x - 1.0) if n * dt > 1.5 else 0.0)
+    assert least <= swing < most
 
 
 def test_a_lag_lets_all_arrive_whatever_the_steps():
@@ -94,25 +94,16 @@ def test_the_damped_step_is_the_minimum():
         np.testing.assert_allclose(damped_step(J, 1 / K, e, damping, dq_0), expected, atol=1e-9)
 
 
-@pytest.mark.parametrize("p_BG", [(0.2, 0.0, 0.6), (0.0, 0.3, 0.5), (-0.5, 0.1, 0.3), (0.6, 0.0, 0.6), (0.0, 0.0, 0.2)])
+@pytest.mark.parametrize("p_BG", [(0.2, 0.0, 0.6), (-0.5, 0.1, 0.3), (0.0, 0.0, 0.2)])
 def test_the_models_reach_is_that_of_a_general_optimiser(p_BG: tuple[float, float, float]):
     p = np.array(p_BG)
-    starts = [
-        Q_CALIB + np.tile([0.3 * p[0], 0.3 * p[1], 0.0], 3),
-        Q_CALIB + np.tile([0.8 * p[0], 0.8 * p[1], -0.02], 3),
-    ]
+    starts = [Q_CALIB + np.tile([part * p[0], part * p[1], dl], 3) for part, dl in ((0.3, 0.0), (0.8, -0.02))]
     found = min(nearest_distance(p, q, P.K_initialize, LIMITS, 0.1) for q in starts)
 
     def distance(q: Floats) -> float:
         return float(np.linalg.norm(forward_kinematics(q, 0.1)[3:] - p))
 
-    def room(q: Floats) -> Floats:
-        return LIMITS.UB[::2] ** 2 - q[0::3] ** 2 - q[1::3] ** 2
-
     bounds = [b for k in range(3) for b in [(-2, 2), (-2, 2), (LIMITS.LB[2 * k + 1], LIMITS.UB[2 * k + 1])]]
-    within = NonlinearConstraint(room, 0.0, np.inf)
-    best = min(
-        float(minimize(distance, q, method="SLSQP", bounds=bounds, constraints=within, options={"maxiter": 500}).fun)
-        for q in starts
-    )
-    assert found < best + 0.005
+    within = NonlinearConstraint(lambda q: LIMITS.UB[::2] ** 2 - q[0::3] ** 2 - q[1::3] ** 2, 0.0, np.inf)
+    given: dict[str, Any] = {"method": "SLSQP", "bounds": bounds, "constraints": within, "options": {"maxiter": 500}}
+    assert found < min(float(minimize(distance, q, **given).fun) for q in starts) + 0.005

@@ -84,3 +84,9 @@ def distances(y: Outputs, u: Scene) -> Floats:
     """Errors of ball, wrist and gripper, in m."""
     pairs = [(y.p_WO_meas, u.p_WO), (y.p_WR_meas, u.p_WR), (y.p_WG_meas, u.p_WG)]
     return np.array([float(np.linalg.norm(a - b)) for a, b in pairs])
+
+
+def squared(y: Outputs, u: Scene) -> Floats:
+    """Squares of the errors of ball, wrist and gripper, by their covariances."""
+    pairs = [(y.p_WO_meas - u.p_WO, y.cov_O), (y.p_WR_meas - u.p_WR, y.cov_R), (y.p_WG_meas - u.p_WG, y.cov_G)]
+    return np.array([float(e @ np.linalg.solve(cov, e)) for e, cov in pairs])
