@@ -27,34 +27,21 @@ from handover.scenarios.helix.reflex_grasp_parameters import ReflexGraspParamete
 
 Paper = dict[str, dict[str, dict[str, Any]]]
 
-CODE = {
-    "servo": ServoParams,
-    "arm": ArmParams,
-    "hand": HandParams,
-    "camera": CameraParams,
-    "vision": VisionParams,
-    "task": Task,
-    "disturbances": Disturbances,
-    "reach": ReachParameters,
-    "infrared": InfraredParams,
-    "reflex": ReflexParams,
-    "reflex_grasp": ReflexGraspParameters,
+CODE: dict[str, tuple[type[Any], tuple[str, ...]]] = {
+    "servo": (ServoParams, ("servo", "own")),
+    "arm": (ArmParams, ("arm",)),
+    "hand": (HandParams, ("hand",)),
+    "camera": (CameraParams, ("pictures",)),
+    "vision": (VisionParams, ("vision",)),
+    "task": (Task, ("task",)),
+    "disturbances": (Disturbances, ("disturbances",)),
+    "reach": (ReachParameters, ()),
+    "infrared": (InfraredParams, ("infrared",)),
+    "reflex": (ReflexParams, ("reflex",)),
+    "reflex_grasp": (ReflexGraspParameters, ("reflex_grasp",)),
 }
+"""Classes, and groups that have a class's parameters alone."""
 
-GROUPS: dict[str, tuple[str, ...]] = {
-    "servo": ("servo", "own"),
-    "arm": ("arm",),
-    "hand": ("hand",),
-    "camera": ("pictures",),
-    "vision": ("vision",),
-    "task": ("task",),
-    "disturbances": ("disturbances",),
-    "reach": (),
-    "infrared": ("infrared",),
-    "reflex": ("reflex",),
-    "reflex_grasp": ("reflex_grasp",),
-}
-"""Groups that have a class's parameters alone."""
 
 _OPTICS: dict[str, tuple[Any, ...]] = {
     "p_WC_left": ("camera", "p_WC", 0),
@@ -80,7 +67,6 @@ SHARED: dict[str, dict[str, tuple[Any, ...]]] = {
         "carry_after": ("delivery", "carry_after"),
         "threshold_drop": ("delivery", "threshold_drop", Tuning.OWN),
     },
-    "arm": {},
     "hand": {"bowl_depth": ("bowl", "bowl_depth")},
     "camera": _OPTICS
     | {"p_WD": ("hand", "p_WD"), "bowl_radius": ("hand", "bowl_radius"), "bowl_depth": ("bowl", "bowl_depth")},
@@ -114,9 +100,6 @@ SHARED: dict[str, dict[str, tuple[Any, ...]]] = {
         "covered_markers": ("pictures", "covered_markers"),
         "jitter": ("servo", "jitter"),
     },
-    "infrared": {},
-    "reflex": {},
-    "reflex_grasp": {},
     "reach": _PLACE | {"azimuth": ("task", "azimuth"), "patience": ("task", "patience")},
 }
 """Parameters whose origin is that of another one: its group, its name there, and where it is a list, which element."""
@@ -132,54 +115,39 @@ def paper() -> Paper:
     return tomli.loads(file.read_text(encoding="utf-8"))
 
 
-@pytest.mark.parametrize("file", FILES, ids=lambda file: file.parent.name)
-def test_every_value_has_its_unit_origin_and_status(file: Path):
-    for group in tomli.loads(file.read_text(encoding="utf-8")).values():
-        for name, entry in group.items():
-            assert set(entry) == {"value", "unit", "where", "status"}, name
-            assert entry["unit"], name
-            assert entry["where"], name
-            assert entry["status"] in STATUS, name
-
-
-def test_every_robot_has_its_paper_file():
-    experiments = {e.__module__.split(".")[2] for e in SCENARIOS.values()}
-    assert {file.parent.name for file in FILES} == experiments
+def test_every_value_has_its_unit_origin_and_status():
+    assert {file.parent.name for file in FILES} == {e.__module__.split(".")[2] for e in SCENARIOS.values()}
+    for file in FILES:
+        for group in tomli.loads(file.read_text(encoding="utf-8")).values():
+            for name, entry in group.items():
+                assert set(entry) == {"value", "unit", "where", "status"}, name
+                assert all((entry["unit"], entry["where"], entry["status"] in STATUS)), name
 
 
 def origins_of(paper: Paper, name: str) -> dict[str, Any]:
     """Return the origins of a unit's or a scenario's parameters: groups of its own, and what it shares with others."""
-    origins = {parameter: entry for group in GROUPS[name] for parameter, entry in paper[group].items()}
-    for parameter, (group, key, *index) in SHARED[name].items():
+    origins = {parameter: entry for group in CODE[name][1] for parameter, entry in paper[group].items()}
+    for parameter, (group, key, *index) in SHARED.get(name, {}).items():
         entry = paper[group][key]
         origins[parameter] = entry | {"value": entry["value"][index[0]]} if index else entry
     return origins
 
 
-@pytest.mark.parametrize("name", GROUPS)
+@pytest.mark.parametrize("name", CODE)
 def test_every_default_has_its_origin(paper: Paper, name: str):
     origins = origins_of(paper, name)
     if name in ("camera", "vision"):  # turned to what all cameras look at
         poses = camera_parameters(places=CameraPlaces.THREE)
         for side in CameraPlaces.THREE.sides:
             origins[f"q_WC_{side}"] = paper["camera"]["looked_at"] | {"value": poses[f"q_WC_{side}"], "unit": "1"}
-    assert_every_default_has_its_origin(origins, CODE[name])
+    assert_every_default_has_its_origin(origins, CODE[name][0])
 
 
-def test_the_places_are_the_published_ones(paper: Paper):
+def test_what_stands_elsewhere_in_the_code_is_the_published(paper: Paper):
     assert [e.name.lower().replace("_", "-") for e in HandPlace] == paper["experiment"]["places"]["value"]
-
-
-def test_a_state_at_its_limit_becomes_as_stiff_as_published(paper: Paper):
     assert paper["jacobian_control"]["stiffening"]["value"] == STIFFENING
-
-
-def test_the_ball_s_motion_along_an_axis_is_the_hand_s_tremor(paper: Paper):
     tremor = paper["hand"]["tremor_rms"]["value"]
     assert paper["servo"]["ball_motion"]["value"] == pytest.approx(tremor / np.sqrt(3.0), abs=5e-5)
-
-
-def test_the_cameras_are_where_the_paper_file_says(paper: Paper):
     c = camera_parameters(places=CameraPlaces.THREE)
     assert [c["p_WC_left"].tolist(), c["p_WC_right"].tolist()] == paper["camera"]["p_WC"]["value"]
     assert c["p_WC_third"].tolist() == paper["camera"]["p_WC_top"]["value"]

@@ -48,14 +48,9 @@ def test_the_depth_is_that_of_a_ball_beside_the_axis_of_a_cylinder():
     assert not any("the ball" in fault for fault in faults(0.0601, -0.3))
 
 
-@pytest.mark.parametrize(
-    ("z", "free"),
-    [(-DOWN_TO_GRIPPER, True), (-DOWN_TO_WRIST - 0.06, False), (-DOWN_TO_GRIPPER - 0.1, True)],
-    ids=["between the open fingers", "in the gripper's palm", "below it"],
-)
-def test_a_ball_may_start_where_nothing_of_the_gripper_is(z: float, free: bool):
-    assert (not faults(0.0, z)) is free
-
-
-def test_a_hand_that_waits_beside_the_arm_is_free_wherever_its_ball_is_offered():
+def test_a_ball_may_start_where_nothing_of_the_gripper_is():
+    """Between the open fingers and below them, not in the palm; a hand that waits beside the arm is free anywhere."""
+    assert not faults(0.0, -DOWN_TO_GRIPPER)
+    assert faults(0.0, -DOWN_TO_WRIST - 0.06)
+    assert not faults(0.0, -DOWN_TO_GRIPPER - 0.1)
     assert all(not faults(0.0, z, room=0.12) for z in np.linspace(-0.9, -0.1, 17))

@@ -7,6 +7,7 @@ import numpy as np
 import pyarrow as pa
 import pytest
 from support.kept_runs import kept_run
+from support.wording import Wording
 
 from handover.fmus.build import cached
 from handover.scenarios.campaign.table import CampaignTable
@@ -18,53 +19,28 @@ from handover.scenarios.published.helix.helix_workspace import AZIMUTHS, HEIGHTS
 from handover.scenarios.published.published_experiment import Verdict
 
 
-@pytest.mark.parametrize(
-    ("p_WO", "cameras"),
-    [
+def test_a_ball_is_seen_where_it_and_the_markers_are_whole_and_large_enough():
+    for p_WO, cameras in (
         ([0.16, 0.0, -0.6], 2),
         ([0.0, 0.28, -0.6], 2),
-        ([0.0, 0.6, -0.6], 1),
-        ([0.0, -0.6, -0.6], 1),
-        ([0.0, 0.0, -0.05], 0),
-        ([-1.5, 0.0, -0.6], 0),
-        ([0.6, 0.0, -0.6], 0),
-    ],
-    ids=["front", "left", "left of a view", "right of a view", "too high", "behind", "too far off"],
-)
-def test_a_ball_is_seen_where_it_and_the_markers_are_whole_and_large_enough(p_WO: list[float], cameras: int):
-    assert cameras_that_see(np.array(p_WO)) == cameras
+        ([0.0, 0.6, -0.6], 1),  # left of a view
+        ([0.0, -0.6, -0.6], 1),  # right of a view
+        ([0.0, 0.0, -0.05], 0),  # too high
+        ([-1.5, 0.0, -0.6], 0),  # behind
+        ([0.6, 0.0, -0.6], 0),  # too far off
+    ):
+        assert cameras_that_see(np.array(p_WO)) == cameras, p_WO
+    assert cameras_that_see(np.array([0.16, 0.0, -0.6]), CameraPlaces.THREE) == 3
 
 
-def test_a_third_camera_sees_a_place_besides():
-    place = np.array([0.16, 0.0, -0.6])
-    assert cameras_that_see(place, CameraPlaces.THREE) == 3
-    (far, seen) = notes_on_place(np.array([0.0, 0.6, -0.6]), CameraPlaces.THREE)
-    assert "but the arm is sure to reach" in far
-    outside = "ball or markers lie outside of the picture"
-    assert seen.endswith(f"where one camera alone sees ball and markers whole (left: {outside}; third: {outside})")
-
-
-def test_markers_that_are_too_small_to_read_are_told_apart_from_those_out_of_the_picture():
-    far, small = notes_on_place(np.array([0.5, 0.0, -0.6]))
-    assert "but the arm is sure to reach" in far
-    assert small.endswith("(left: markers are less than 14 px wide; right: markers are less than 14 px wide)")
-    assert len(notes_on_place(np.array([0.5, 0.0, -0.6]), marker=0.024)) == 1
-
-
-def test_places_within_the_workspace_have_no_notes():
+def test_a_place_beyond_the_workspace_is_noted_with_how_far_the_arm_reaches(wording: Wording):
+    high, far, aside, beside = np.array([[0.0, 0.0, -0.05], [0.5, 0.0, -0.6], [0.0, 0.3, -0.6], [0.0, 0.6, -0.6]])
+    for notes in (notes_on_place(aside), notes_on_place(high), notes_on_place(far)):
+        wording.check("\n".join(notes))
+    wording.check("\n".join(notes_on_place(far, marker=0.024)))
+    wording.check("\n".join(notes_on_place(beside, CameraPlaces.THREE)))
     for azimuth in np.linspace(-np.pi, np.pi, 12):
         assert not notes_on_place(np.array([0.12 * np.cos(azimuth), 0.12 * np.sin(azimuth), -0.6]))
-
-
-def test_a_place_beyond_it_is_noted_with_how_far_the_arm_reaches():
-    (note,) = notes_on_place(np.array([0.0, 0.3, -0.6]))
-    assert note == (
-        "the ball is offered 0.30 m from the arm's axis at a height of -0.60 m, but the arm is sure to reach "
-        f"{reach(-0.6):.2f} m far there, whatever the direction"
-    )
-    high, unseen = notes_on_place(np.array([0.0, 0.0, -0.05]))
-    assert high.endswith("but the arm is not known to reach that height, whatever the direction")
-    assert "where no camera sees ball and markers whole (left: ball or markers lie outside" in unseen
 
 
 def test_the_scenario_passes_the_notes_on():

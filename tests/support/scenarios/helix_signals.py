@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from handover.controllers.helix.servo.visual_servo import Phase
+from handover.controllers.helix.servo.visual_servo import Phase, Verdict
 from handover.cosim.blocks.variable import Causality, Kind
 from handover.cosim.fmu.file.description import FmuPort
 from handover.plants.helix.hand.partner_parameters import Holder
@@ -26,18 +26,19 @@ def views_and_ports(
     beside: float = 0.0,
     along: float = 0.0,
     sees_ball: bool = True,
+    verdict: Verdict = Verdict.NONE,
     hand_force: float = 0.2,
     error: float = 0.01,
     touching: bool = True,
 ) -> tuple[Views, Ports]:
     """Return what a gripper that hangs down, and a ball at a place in its frame, would show."""
+    f_G, f_H = (np.array([0.0, 0.0, f]) for f in (0.1 * touching, -hand_force))
     reals = {
         "arm": {"p_WG": P_WG, "q_WG": [0.0, 1.0, 0.0, 0.0]},
-        "hand": {"p_WO": P_WG + np.array([beside, 0.0, -along]), "f_H": np.array([0.0, 0.0, -hand_force])},
+        "hand": {"p_WO": P_WG + np.array([beside, 0.0, -along]), "f_H": f_H, "f_G": f_G},
         "servo": {"error": [error], "p_WO_est": P_WG, "p_WR_est": P_WG, "p_WG_est": P_WG, "q_sys": CALIBRATED},
         "vision": {"p_WO_meas": P_WG, "p_WR_meas": P_WR, "p_WG_meas": P_WG},
     }
-    reals["hand"]["f_G"] = np.array([0.0, 0.0, 0.1 if touching else 0.0])
     units: Views = {
         unit: {name: (np.array(value),) for name, value in values.items()} for unit, values in reals.items()
     }
@@ -48,7 +49,7 @@ def views_and_ports(
     for name, seen in (("seen_O", sees_ball), ("seen_R", True)):
         units["vision"][name] = (np.array([seen]),)
         ports["vision"][name] = port(name, Kind.BOOLEAN)
-    for unit, name, item in (("servo", "phase", phase), ("hand", "holder", holder)):
+    for unit, name, item in (("servo", "phase", phase), ("hand", "holder", holder), ("servo", "verdict", verdict)):
         units[unit][name] = (np.array([int(item)]),)
         ports[unit][name] = port(name, Kind.ENUMERATION, items=tuple((i.name, int(i)) for i in type(item)))
     pixels = (np.array([PICTURE.ctypes.data]), np.array([PICTURE.size]))
