@@ -1,13 +1,12 @@
 """Against closed forms of a mass under sampled control."""
 
 import math
-import os
-import subprocess
-import sys
-import textwrap
+from typing import Any
 
+import control as untyped_control
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from handover.controllers.free_flyer.sampled_loop import (
     LinearController,
@@ -19,6 +18,7 @@ from handover.controllers.free_flyer.sampled_loop import (
 from handover.cosim.blocks.ports import Floats
 
 T = 0.016
+control: Any = untyped_control
 ROLLER = LinearPlant(A=np.zeros((1, 1)), B=np.eye(1), E=np.eye(1), C=np.eye(1))  # x' = u + d
 
 
@@ -86,34 +86,20 @@ def test_bisection_finds_the_limit():
     assert largest_stable(lambda _: 2.0, 1.0) == 0.0
 
 
-@pytest.mark.slow
-def test_closing_a_loop_wakes_no_thread_of_blas_and_leaves_their_number():
-    """CPU time of other threads in the 0.3 s after a loop of 24 rows was sampled, in a process where BLAS has two."""
-    code = """
-        import time
-        import numpy as np
-        from threadpoolctl import threadpool_info
-        from handover.controllers.free_flyer.sampled_loop import LinearPlant, SampledLoop, without_memory
+def threads() -> set[int]:
+    return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
 
-        def loop(mass):
-            A = np.kron([[0.0, 1.0], [0.0, 0.0]], np.eye(6))
-            B = np.vstack([np.zeros((6, 6)), np.eye(6) / mass])
-            return SampledLoop(LinearPlant(A=A, B=B, E=B, C=np.eye(12)), without_memory(np.eye(6, 12)), 0.016, 0.02)
 
-        def threads():
-            return [library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"]
+def test_a_loop_is_sampled_in_one_thread_of_blas_and_their_number_is_left(monkeypatch: pytest.MonkeyPatch):
+    seen, sample = list[set[int]](), control.sample_system
 
-        loop(1.0).poles
-        time.sleep(0.5)  # threads wait busily when a library has been loaded, too
-        before = threads()
-        begin = time.process_time() - time.thread_time()
-        loop(2.0).poles
-        time.sleep(0.3)
-        print(time.process_time() - time.thread_time() - begin, threads() == before and max(before))
-    """
-    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "2"}
-    command = [sys.executable, "-c", textwrap.dedent(code)]
-    answer = subprocess.run(command, env=environment, check=True, capture_output=True, text=True).stdout
-    others, threads = answer.split()
-    assert float(others) < 0.01
-    assert threads == "2"
+    def noted(*given: Any, **more: Any) -> Any:
+        seen.append(threads())
+        return sample(*given, **more)
+
+    monkeypatch.setattr(control, "sample_system", noted)
+    with threadpool_limits(2, "blas"):
+        assert SampledLoop(*spring(), T).pole_radius < 1.0
+        seen.append(threads())
+    assert seen[0] == {1}
+    assert seen[-1] == {2}

@@ -163,9 +163,10 @@ def test_an_object_that_a_fingertip_is_felt_to_meet_is_gone_around():
 def test_the_hand_is_slow_on_the_last_part_of_its_way_to_the_pre_grasp_pose(way: float):
     seen = grasp(reflex(arrival_way=way), scene((0.5, 0.35)), Phase.SEARCH)
     left = PREGRASP[0] - np.array([y.p_WH[0] for _, y in seen])
-    speed = -np.diff(left) / DT
-    last = speed[(left[1:] < 0.03) & (left[1:] > 0.015)]
+    last = (-np.diff(left) / DT)[(left[1:] < 0.03) & (left[1:] > 0.015)]
     assert (np.max(last) < 1.1 * Params().arrival_speed) == (way > 0.0)
+    there = reflex(sigma_pregrasp=0.1, arrival_way=0.0).step(0.0, DT, Inputs(p_WH=np.array(PREGRASP)))
+    assert (there.phase, there.p_WH_cmd.tolist(), there.sigma_cmd) == (Phase.REACH, list(PREGRASP), 0.1)
 
 
 @pytest.mark.parametrize(
@@ -202,19 +203,19 @@ def test_a_reading_beyond_the_range_is_not_seen_and_weighs_nothing():
 
 
 def test_contact_closes_when_joints_or_tendon_feel_the_object_between_the_fingers():
-    seen = grasp(reflex(strategy=Strategy.CONTACT), scene((0.01, 0.02)))
-    o, y = seen[-1]
-    assert o.stop is Stop.CONTACT
-    assert y.touching >= 1
-    assert not {Phase.TRACK, Phase.SEARCH, Phase.PROBE} & phases(seen)
-    numb: dict[str, Any] = {"strategy": Strategy.CONTACT, "touch_torque": 100.0}
-    assert grasp(reflex(**numb), scene((0.01, 0.02)))[-1][0].stop is Stop.REACH
-    by_tendon = grasp(reflex(**numb), scene((0.01, 0.06)))[-1][0]
-    assert by_tendon.stop is Stop.CONTACT
-    apart = grasp(reflex(strategy=Strategy.CONTACT), scene((0.5, 0.35)))
-    assert apart[-1][0].p_WH_cmd[0] - PREGRASP[0] >= Params().reach[0] - 1e-3
-    assert apart[-1][0].stop is Stop.REACH
-    assert not apart[-1][1].touching
+    numb = {"touch_torque": 100.0}
+    for given, p_WO, stop in (
+        ({}, (0.01, 0.02), Stop.CONTACT),
+        (numb, (0.01, 0.02), Stop.REACH),
+        (numb, (0.01, 0.06), Stop.CONTACT),  # by the tendon
+        ({}, (0.5, 0.35), Stop.REACH),
+    ):
+        seen = grasp(reflex(strategy=Strategy.CONTACT, **given), scene(p_WO))
+        o, y = seen[-1]
+        assert o.stop is stop
+        assert not {Phase.TRACK, Phase.SEARCH, Phase.PROBE} & phases(seen)
+        assert given or (y.touching > 0) == (p_WO[0] < 0.1)
+    assert o.p_WH_cmd[0] - PREGRASP[0] >= Params().reach[0] - 1e-3
 
 
 @pytest.mark.parametrize(
@@ -234,12 +235,6 @@ def test_it_goes_on_from_any_state_bit_for_bit(
     assert_passed_on(lambda: reflex(**given), [read(y) for _, y in seen], 5, DT)
 
 
-def test_a_wrist_at_the_pre_grasp_pose_waits_for_the_closure():
-    controller = reflex(sigma_pregrasp=0.1, arrival_way=0.0)
-    o = controller.step(0.0, DT, Inputs(p_WH=np.array(PREGRASP)))
-    assert (o.phase, o.p_WH_cmd.tolist(), o.sigma_cmd) == (Phase.REACH, list(PREGRASP), 0.1)
-
-
 def test_what_the_correction_on_the_move_cannot_work_with_is_refused(wording: Wording):
     refused: tuple[dict[str, Any], ...] = (
         {"literal": True},
@@ -255,15 +250,15 @@ def test_what_the_correction_on_the_move_cannot_work_with_is_refused(wording: Wo
 
 
 def test_a_grasp_begins_with_the_jacobian_of_the_last_one():
-    first, design = reflex(), np.zeros((3, 4))
-    assert np.array_equal(first.outputs(0.0, Inputs()).jacobian_offset, design)
-    end = grasp(first, scene((0.03, 0.02)))[-1][0]
-    assert np.max(np.abs(end.jacobian_offset[[0, 2]])) > 0.02  # what thumb and ring saw was not met squarely
-    second = reflex(jacobian_offset_0=end.jacobian_offset)
-    assert np.array_equal(second.outputs(0.0, Inputs()).jacobian_offset, end.jacobian_offset)
-    seen = grasp(second, scene((0.03, 0.02)))
-    assert not np.array_equal(seen[-1][0].jacobian_offset, end.jacobian_offset)
-    assert np.linalg.norm(in_hand(seen[-1][1])) < 0.2
+    first = reflex()
+    assert not np.any(first.outputs(0.0, Inputs()).jacobian_offset)
+    learnt = grasp(first, scene((0.03, 0.02)))[-1][0].jacobian_offset
+    assert np.max(np.abs(learnt[[0, 2]])) > 0.02  # what thumb and ring saw was not met squarely
+    second = reflex(jacobian_offset_0=learnt)
+    assert np.array_equal(second.outputs(0.0, Inputs()).jacobian_offset, learnt)
+    o, y = grasp(second, scene((0.03, 0.02)))[-1]
+    assert not np.array_equal(o.jacobian_offset, learnt)
+    assert np.linalg.norm(in_hand(y)) < 0.2
 
 
 @pytest.mark.slow

@@ -91,10 +91,8 @@ def test_hull_holds_its_points_and_touches_them():
 
 
 def test_points_beyond_an_axis_or_a_corner_are_outside():
-    cubic = fitted()
-    assert cubic.outside(np.array([2.1, 0.05, 1e5]))
-    assert cubic.outside(np.array([0.5, 0.05, 4e4]))
-    assert cubic.outside(np.array([0.5, np.nan, 1e5]))
+    for x in ([2.1, 0.05, 1e5], [0.5, 0.05, 4e4], [0.5, np.nan, 1e5]):
+        assert fitted().outside(np.array(x))
     x = RNG.normal(size=(300, 2))
     x = x[np.sum(x**2, axis=1) < 1.0]
     disc = fit_cubic(x, x, x, x).cubic
@@ -128,23 +126,17 @@ def test_the_corrected_jacobian_is_the_derivative_of_the_tip(text: str):
     assert np.max(np.abs(m.tip_jacobian(q, p, i) - m.kinematics.jacobian(q))) > 0.005
 
 
-def test_of_positions_the_corrected_jacobian_is_the_derivative_too():
-    cubic = parse_model(DEFAULT_MODEL, "that ships").forward
+def test_a_published_model_gives_angles_and_position_themselves():
+    cubic, m = parse_model(DEFAULT_MODEL, "that ships").forward, model()
     assert isinstance(cubic, Cubic)
     by_X = Cubic(np.array([0.3, 0.0, 0.15, *cubic.mean[3:]]), cubic.scale, cubic.hull, cubic.powers, cubic.coefficients)
     q, p, i = np.array([0.3, 0.6, -1.2]), np.array([0.9e5, 1.2e5]), np.array([0.0, 0.7, 0.15])
     for kind in (Learned.CUBIC, Learned.PUBLISHED):
-        m = VslModel(by_X, by_X, model().kinematics, {}, kind, ForwardInput.X)
-        np.testing.assert_allclose(m.tip_jacobian(q, p, i), slopes(lambda q, m=m: m.tip(q, p, i), q, 1e-5), atol=1e-7)
-
-
-def test_a_published_model_gives_angles_and_position_themselves():
-    m = model()
-    published = VslModel(m.inverse, m.forward, m.kinematics, {}, Learned.PUBLISHED, ForwardInput.X)
-    q, p, i = np.array([0.6, 0.5, -1.0]), np.array([0.1, 0.2]), np.array([9.0, 0.3, 0.4])
-    np.testing.assert_array_equal(published.command(q, p, i), m.inverse.predict(inputs_of(q, p, i)))
-    X = m.kinematics.forward(q)
-    np.testing.assert_array_equal(published.tip(q, p, i), m.forward.predict(inputs_of(X, p, i)))
+        made = VslModel(m.inverse, by_X, m.kinematics, {}, kind, ForwardInput.X)
+        slope = slopes(lambda q, made=made: made.tip(q, p, i), q, 1e-5)
+        np.testing.assert_allclose(made.tip_jacobian(q, p, i), slope, atol=1e-7)
+    np.testing.assert_array_equal(made.command(q, p, i), m.inverse.predict(inputs_of(q, p, i)))
+    np.testing.assert_array_equal(made.tip(q, p, i), by_X.predict(inputs_of(m.kinematics.forward(q), p, i)))
 
 
 def test_few_points_are_enough_to_adapt():

@@ -11,7 +11,6 @@ from typing import ClassVar
 import numpy as np
 
 from handover.cosim.blocks.ports import Vector2, Vector3, Vector9, output, parameter, port
-from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.units import Metre, NewtonMetre, Number, Radian, RadianPerSecond
 
 
@@ -85,10 +84,6 @@ class Misspelled(Stateless):
 """A controller of which no port is named as its place has it, and one is of another kind."""
 
 PROPORTIONAL = """
-ANGLES = np.radians([0.0, 120.0, 240.0])
-LENGTHS = np.array([0.12, 0.24, 0.24])
-
-
 @dataclass(kw_only=True)
 class Inputs:
     p_WO_meas: Vector3[Metre] = port(np.zeros(3), "position of the ball")
@@ -101,31 +96,14 @@ class Outputs:
 
 
 class Proportional(Stateless):
-    \"\"\"Bends and stretches all segments alike, in proportion to what is left of the way: up, then over.\"\"\"
-
     feedthrough = {"dl_t": ("p_WO_meas", "p_WG_meas")}
     period = Fraction(1, 2)
 
-    def __init__(self, params: Params) -> None:
-        self.bend, self.stretch = np.zeros(2), 0.0  # rad towards x and y of B; share of a segment's length
-
     def outputs(self, t: float, u: Inputs) -> Outputs:
-        towards = self.bend @ [np.cos(ANGLES), np.sin(ANGLES)]
-        return Outputs(dl_t=(self.stretch * LENGTHS[:, None] - 0.035 * towards).reshape(9))
+        return Outputs(dl_t=-0.05 * np.repeat(u.p_WO_meas - u.p_WG_meas, 3))
 
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:
-        e = u.p_WO_meas - u.p_WG_meas
-        e[2] += 0.08
-        e[:2] *= e[2] < 0.04  # the straight way leads through the hand
-        self.bend = self.bend + 0.3 * np.array([e[0], -e[1]])  # y of B is minus y of W
-        self.stretch = min(max(self.stretch - 0.6 * e[2], -0.3), 0.08)
         return self.outputs(t, u)
-
-    def get_state(self) -> bytes:
-        return pack_state((self.bend, self.stretch))
-
-    def set_state(self, state: bytes) -> None:
-        self.bend, self.stretch = unpack_state(state)
 """
 """The shortest controller of the Helix: it takes two inputs and gives one output."""
 

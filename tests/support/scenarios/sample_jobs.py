@@ -8,6 +8,7 @@ from handover.cosim.stepping.options import MasterOptions
 from handover.fmus.build import build_block, cached
 from handover.scenarios.campaign.worker_pool import RunJob
 from handover.scenarios.catalog import SCENARIOS
+from support.cosim.native_units import native_fmu
 
 
 def job(runs: Path, name: str = "run", *parameters: str, scenario: str = "ir_grasp", seed: int = 3) -> RunJob:
@@ -18,6 +19,15 @@ def job(runs: Path, name: str = "run", *parameters: str, scenario: str = "ir_gra
     return RunJob(
         name=name, scenario=scenario, parameters=parameters, seed=seed, fmus=fmus, runs=str(runs), options=options
     )
+
+
+def quick_job(runs: Path, name: str = "run", seed: int = 3) -> RunJob:
+    """Return the job of a run of a native unit that computes next to nothing."""
+    runs.mkdir(exist_ok=True)
+    return RunJob(
+        name=name, scenario=str(native_fmu("mass")), parameters=(), seed=seed, fmus={}, runs=str(runs),
+        options=MasterOptions(), stop=Fraction(1),
+    )  # fmt: skip
 
 
 def bad_job(runs: Path, reflex: str, built: Path, name: str = "bad", call_limit: float | None = None) -> RunJob:
