@@ -17,7 +17,7 @@ INSTALL := $(BIN)/python -m pip install --quiet --no-compile --constraint constr
 
 WHEELS := x86_64-linux aarch64-linux x86_64-windows x86_64-darwin aarch64-darwin
 
-.PHONY: demo test test-changed test-slow fuzz paper real-time platforms hosts lint bench wording pictures notebook icons wheels install clean
+.PHONY: demo test test-changed test-slow fuzz paper real-time platforms hosts lint bench wording docs pictures notebook icons wheels install clean
 
 demo: $(VENV)/.installed
 	$(BIN)/handover run helix_handover
@@ -64,6 +64,10 @@ bench: $(VENV)/.installed-test
 wording: $(VENV)/.installed-test
 	HANDOVER_REWRITE_WORDING=1 $(BIN)/python -m pytest -q -m "not hosts" $$(grep -rl "wording: Wording" tests --include="test_*.py")
 
+# The site, which opens offline: docs/build/html/index.html.
+docs: $(VENV)/.installed-docs
+	$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going --builder html docs docs/build/html
+
 # The README's pictures; needs chromium, too.
 pictures: $(VENV)/.installed-test
 	$(BIN)/python docs/pictures.py
@@ -95,5 +99,9 @@ $(VENV)/.installed-test: $(OF_PACKAGE) | $(VENV)/bin/python
 	$(INSTALL) ".[test]"
 	touch $(VENV)/.installed $@
 
+$(VENV)/.installed-docs: $(OF_PACKAGE) | $(VENV)/bin/python
+	$(INSTALL) ".[docs]"
+	touch $(VENV)/.installed $@
+
 clean:
-	rm -rf $(VENV) build *.egg-info fmus/runtime/bin cosim/plan/bin cosim/isolation/bin
+	rm -rf $(VENV) build docs/build *.egg-info fmus/runtime/bin cosim/plan/bin cosim/isolation/bin

@@ -1,4 +1,4 @@
-"""Makes the README's pictures anew, of runs of today: `make pictures`. Needs what the tests need, and chromium.
+"""Makes the pictures of README and site anew, of runs of today: `make pictures`. Needs what the tests need, and chromium.
 
 Those of published experiments take their whole campaigns, up to an hour; `python docs/pictures.py NAME...` makes some.
 
@@ -34,6 +34,8 @@ EXPERIMENTS: Mapping[str, tuple[str, str]] = {
     "helix_workspace.png": ("helix-workspace", "workspace"),
 }
 """Published experiment and figure that a picture shows."""
+FILM, FILM_OPTIONS = "helix_handover.gif", ("--size", "640x360", "--pace", "4", "--fps", "8")
+"""The film of `helix_handover`, with its options."""
 REPORT = "report.jpg"
 """The report page of `helix_handover`, on a desk and on a phone."""
 
@@ -50,25 +52,27 @@ _EDGE = 24
 
 def main() -> None:
     """Make the runs and campaigns of the pictures that are asked for, or of all, and write the pictures."""
-    every = {REPORT: ("helix_handover", ""), **FIGURES, **EXPERIMENTS}
+    every = {REPORT: ("helix_handover", ""), FILM: ("helix_handover", ""), **FIGURES, **EXPERIMENTS}
     wanted = sys.argv[1:] or list(every)
     if unknown := set(wanted) - set(every):
-        sys.exit(f"no picture of the README: {', '.join(sorted(unknown))}; there are {', '.join(every)}")
+        sys.exit(f"no picture of README and site: {', '.join(sorted(unknown))}; there are {', '.join(every)}")
     with tempfile.TemporaryDirectory(prefix="handover-") as folder:
         for name in wanted:
             source, figure = every[name]
             made = Path(folder) / source
             if not made.exists():
-                _handover("paper" if name in EXPERIMENTS else "run", source, made)
-            if name == REPORT:
+                _handover("paper" if name in EXPERIMENTS else "run", source, "--out", made)
+            if name == FILM:
+                _handover("film", made, "--out", DOCS / name, "--force", *FILM_OPTIONS)
+            elif name == REPORT:
                 _draw_report(made / "report.html", DOCS / REPORT)
             else:
                 _copy(made / "figures" / f"{figure}.png", DOCS / name)
 
 
-def _handover(command: str, what: str, out: Path) -> None:
+def _handover(*arguments: str | Path) -> None:
     call = "from handover.scenarios.cli.command import main; main()"
-    subprocess.run([sys.executable, "-c", call, command, what, "--out", str(out)], check=True)
+    subprocess.run([sys.executable, "-c", call, *map(str, arguments)], check=True)
 
 
 def _copy(figure: Path, to: Path) -> None:

@@ -71,7 +71,7 @@ def page(model: Model, packages: list[Package], platform: str = "") -> bytes:
     environment.filters.update(seconds=seconds, prose=_prose)
     shown = {v.variable.name: v.variable for v in model.layout.shown(model.form)}
     groups = [
-        (title, [_row(v, model.form) for v in shown.values() if v.causality is causality])
+        (title, [row(v, model.form) for v in shown.values() if v.causality is causality])
         for title, causality in _GROUPS
     ]
     d = model.description
@@ -86,7 +86,7 @@ def page(model: Model, packages: list[Package], platform: str = "") -> bytes:
             doc=parse(d.doc),
             papers=cited("\n".join((d.module_doc, d.doc, *(v.description for v in d.variables)))),
             groups=groups,
-            enumerations=[(e.__name__, _items(e)) for e in enumerations(d.variables)],
+            enumerations=[(e.__name__, items(e)) for e in enumerations(d.variables)],
             packages=packages,
         )
         .encode()
@@ -104,7 +104,8 @@ def _prose(text: str) -> Markup:
     return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text))))
 
 
-def _row(v: Variable, form: Form) -> Row:
+def row(v: Variable, form: Form) -> Row:
+    """Return a variable's row in a table."""
     return Row(
         name=v.name,
         kind=_type(v, form),
@@ -141,7 +142,8 @@ def _range(v: Variable) -> str:
     return f"{low or '−∞'} … {high or '∞'}"
 
 
-def _items(enumeration: Iterable[enum.IntEnum]) -> str:
+def items(enumeration: Iterable[enum.IntEnum]) -> str:
+    """Return an enumeration's items with their numbers."""
     return ", ".join(f"{int(item)} {item.name}" for item in enumeration)
 
 

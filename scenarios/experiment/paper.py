@@ -4,7 +4,7 @@
 """
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from typing import Any
@@ -27,6 +27,15 @@ def paper_entry(scenario: str, group: str, name: str) -> dict[str, Any]:
         KeyError: there is no value of that name.
     """
     return dict(_read(scenario)[group][name])
+
+
+def parameter_origins(scenario: str, names: Iterable[str]) -> dict[str, dict[str, Any]]:
+    """Return the group of a scenario's `paper.toml` that has the origins of these parameters, but for a seed's.
+
+    It is empty where there is no such group.
+    """
+    wanted = {*names} - {"seed"}
+    return next((dict(group) for group in _read(scenario).values() if {*group} == wanted), {})
 
 
 @functools.lru_cache
