@@ -1,4 +1,4 @@
-"""Makes the pictures of README and site anew, of runs of today: `make pictures`. Needs what the tests need, and chromium.
+"""Makes the pictures of README and site anew, of runs of today: `make pictures`. Needs what tests need, and chromium.
 
 Those of published experiments take their whole campaigns, up to an hour; `python docs/pictures.py NAME...` makes some.
 
