@@ -1,14 +1,15 @@
 """The site, built by Sphinx: `make docs`. Pages of units, scenarios and commands are made from their declarations."""
 
 import sys
+from importlib.metadata import version as version_of
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parent))
-
-from importlib.metadata import version as version_of
-
-import declared_pages
 from sphinx.application import Sphinx
+
+DOCS = Path(__file__).parent
+sys.path[:0] = [str(DOCS), str(DOCS.parent / "tests")]
+
+import declared_pages  # noqa: E402
 
 project = "handover-cosim"
 author = "The handover-cosim authors"
@@ -34,9 +35,10 @@ html_static_path = ["static"]
 html_css_files = ["site.css"]
 html_theme_options = {"sidebar_hide_name": False, "navigation_with_keys": True}
 html_copy_source = False
+html_extra_path = ["build/files"]
 copybutton_exclude = ".linenos, .gp, .go"
 
-declared_pages.write(Path(__file__).parent / "reference")
+declared_pages.write(DOCS, DOCS / "build" / "files")
 
 
 def set_code(app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]) -> None:  # noqa: ARG001

@@ -1,7 +1,7 @@
-"""Pages of the site that are made from declarations: every unit, every scenario, and their lists.
+"""Pages of the site that are made from declarations: every unit, every scenario, their lists, and the gallery.
 
-`write` leaves Markdown below a folder. Ports, parameters, units of measurement and direct feedthrough are what the
-blocks declare, laws their docstrings, and the origins of a scenario's values those of its `paper.toml`.
+`write` leaves Markdown in the site's folder. Ports, parameters, units of measurement and direct feedthrough are what
+the blocks declare, laws their docstrings, and the origins of a scenario's values those of its `paper.toml`.
 """
 
 import enum
@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import jinja2
+from gallery import gallery_run
 
 from handover.cosim.blocks.description import Description, describe
 from handover.cosim.blocks.variable import Variable
@@ -23,24 +24,28 @@ from handover.scenarios.experiment.paper import parameter_origins
 TEMPLATES = Path(__file__).parent / "templates"
 
 
-def write(folder: Path) -> None:
-    """Write the pages into a folder, `units` and `scenarios`; a page that is the same is left as it is."""
+def write(folder: Path, files: Path) -> None:
+    """Write the pages into a folder, and into another the files of runs; a page that is the same is left as it is."""
     loader = jinja2.FileSystemLoader(TEMPLATES)
     templates = jinja2.Environment(
         loader=loader, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
     )
     templates.filters.update(cell=cell, seconds=seconds)
+    runs = {name: gallery_run(name, files) for name in SCENARIOS}
     robots = [(system, [UNITS[unit] for unit in system.units]) for system in SYSTEMS]
     pages = {
-        "units/index.md": templates.get_template("units.md").render(robots=robots),
-        "scenarios/index.md": templates.get_template("scenarios.md").render(robots=SYSTEMS),
+        "reference/units/index.md": templates.get_template("units.md").render(robots=robots),
+        "reference/scenarios/index.md": templates.get_template("scenarios.md").render(robots=SYSTEMS),
+        "gallery.md": templates.get_template("gallery.md").render(robots=SYSTEMS, runs=runs),
     }
     for entry in UNITS.values():
-        pages[f"units/{entry.name}.md"] = templates.get_template("unit.md").render(unit=entry, **unit(entry))
+        pages[f"reference/units/{entry.name}.md"] = templates.get_template("unit.md").render(unit=entry, **unit(entry))
     for system in SYSTEMS:
         for name in system.scenarios:
             facts = scenario(SCENARIOS[name], system)
-            pages[f"scenarios/{name}.md"] = templates.get_template("scenario.md").render(name=name, **facts)
+            pages[f"reference/scenarios/{name}.md"] = templates.get_template("scenario.md").render(
+                name=name, run=runs[name], **facts
+            )
     for name, text in pages.items():
         file = folder / name
         file.parent.mkdir(parents=True, exist_ok=True)
