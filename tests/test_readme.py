@@ -1,4 +1,4 @@
-"""The README's commands and programs do what it says."""
+"""Commands and programs of README and guides do what these say."""
 
 import contextlib
 import importlib.util
@@ -12,33 +12,29 @@ import sys
 import zipfile
 from collections import Counter
 from collections.abc import Sequence
-from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 import pytest
 from click.testing import CliRunner
 from support.commands import Ended, run_command
+from support.documentation import PAGES, ROOT, TEXT, TEXTS, blocks
 from support.in_process_pool import use_in_process_pool
 from support.kept_runs import copied_run, kept_run
 
 from handover.fmus import interpreter
-from handover.fmus.build import cached
 from handover.fmus.catalog import UNITS
 from handover.fmus.compile import TARGETS
-from handover.fmus.contents.fmi2_description import NoFmi2Form
 from handover.scenarios.catalog import SYSTEMS
 from handover.scenarios.cli.command import main
 
-ROOT = Path(__file__).parent.parent
-README = (ROOT / "README.md").read_text(encoding="utf-8")
-BLOCKS = re.findall(r"^```(\w*)\n(.*?)^```$", README, flags=re.DOTALL | re.MULTILINE)
-COMMANDS = [line for kind, text in BLOCKS if not kind for line in text.splitlines() if line.startswith(".venv/")]
+COMMANDS = [line for text in blocks(TEXT) for line in text.splitlines() if line.startswith(".venv/")]
 RUNS = [c for c in COMMANDS if " run " in c and "--live" not in c]
 OF_FILES = ("model=", "units/", ".ssp")
 """In runs that read what another command has written."""
-PROGRAMS = [text for kind, text in BLOCKS if kind == "python"]
-IN_PYTHON, STEPS, AGENT, OWN_SYSTEM, TERMINALS, IN_FMPY, OWN_BLOCK, OWN_BUILD = PROGRAMS
+IN_PYTHON, STEPS, AGENT, OWN_SYSTEM, TERMINALS = blocks(TEXTS["python"], "python")
+(IN_FMPY,) = blocks(TEXTS["other_tools"], "python")
+OWN_BLOCK, OWN_BUILD = blocks(TEXTS["own"], "python")
 
 
 def handover(command: str, folder: Path, *more: str) -> Ended:
@@ -56,7 +52,7 @@ def program(text: str, folder: Path, patch: pytest.MonkeyPatch) -> str:
     """Run a program in a folder, and return what it prints."""
     patch.chdir(folder)
     with contextlib.redirect_stdout(io.StringIO()) as printed:
-        exec(compile(text, "README.md", "exec"), {"__name__": "__main__"})
+        exec(compile(text, "guide", "exec"), {"__name__": "__main__"})
     return printed.getvalue()
 
 
@@ -77,41 +73,29 @@ def test_the_citation_is_of_this_version():
 
 
 def test_every_path_that_is_linked_exists():
-    for path in re.findall(r"\]\((?!http)([^)#]+)\)", README):
-        assert (ROOT / path).exists(), path
+    for page in PAGES:
+        for path in re.findall(r"\]\((?!http)([^)#]+)[^)]*\)", TEXTS[page.stem]):
+            linked = (page.parent / path).resolve()
+            assert linked.exists() or "reference" in linked.parts, f"{page.name}: {path}"  # which the build makes
 
 
-def test_the_table_of_robots_names_their_units_and_scenarios():
-    rows = [row for row in README.splitlines() if row.startswith("|") and "paper.toml" in row]
+def test_the_readme_is_read_to_its_end_and_its_program_is_the_guides():
+    assert len(TEXTS["README"].splitlines()) <= 150
+    assert blocks(TEXTS["README"], "python") == [IN_PYTHON]
+
+
+def test_the_table_of_robots_names_their_units():
+    rows = [row for row in TEXTS["systems"].splitlines() if row.startswith("|") and ", after " in row]
     assert len(rows) == len(SYSTEMS)
     for row, system in zip(rows, SYSTEMS, strict=True):
-        _, robot, plants, controllers, scenarios, _ = row.split("|")
+        _, robot, plants, controllers, _ = row.split("|")
         assert system.title.split(",")[0] in robot
-        assert re.findall(r"`(\w+)`", scenarios) == [*system.scenarios]
         assert set(re.findall(r"`(\w+)`", plants)) == {u for u in system.units if is_plant(u)}
         assert set(re.findall(r"`(\w+)`", controllers)) == {u for u in system.units if not is_plant(u)}
 
 
 def is_plant(unit: str) -> bool:
     return UNITS[unit].block.startswith("handover.plants.")
-
-
-@pytest.mark.slow
-def test_the_table_of_units_has_their_steps_and_standards():
-    cells = [row.split("|")[1:4] for row in README.splitlines() if re.match(r"\| `[A-Z][a-z]\w+`", row)]
-    sentence = {
-        unit: (step.strip(), fmi.strip()) for units, step, fmi in cells for unit in re.findall(r"`(\w+)`", units)
-    }
-    assert set(sentence) == set(UNITS)
-    for name, entry in UNITS.items():
-        step, fmi = sentence[name]
-        number, unit = step.split()
-        assert Fraction(number) * {"ms": Fraction(1, 1000), "s": 1}[unit] == entry.step
-        try:
-            cached(name, 2)
-            assert fmi == "2, 3"
-        except NoFmi2Form:
-            assert fmi == "3"
 
 
 @pytest.fixture(scope="module")
@@ -140,10 +124,10 @@ def test_a_unit_tells_its_terminals(folder: Path):
 def test_a_unit_runs_in_a_c_program(folder: Path):
     script = block_with("./c_host")
     if shutil.which("cc") is None:
-        assert ".venv/bin/python -m ziglang cc" in README
+        assert ".venv/bin/python -m ziglang cc" in TEXT
         script = script.replace("\ncc ", "\n.venv/bin/python -m ziglang cc ")
     printed = shell(script, folder)
-    assert f"prints `{printed.strip()}`" in README
+    assert f"prints `{printed.strip()}`" in TEXT
 
 
 @pytest.mark.slow
@@ -158,7 +142,7 @@ def test_a_unit_runs_in_ecos(folder: Path):
     column = header.split(", ").index("instance::p_WG[3][REAL]")
     assert len(rows) >= 50
     assert {row.split(", ")[column] for row in rows} == {"-0.700000"}
-    (scalar,) = re.findall(r"`\.venv/bin/(handover build [^`]*--scalar[^`]*)`", README)
+    (scalar,) = re.findall(r"`\.venv/bin/(handover build [^`]*--scalar[^`]*)`", TEXT)
     succeeded(scalar, folder)
     assert (folder / "units" / "TendonArm.fmi3-scalar.fmu").is_file()
 
@@ -188,7 +172,7 @@ def test_commands_that_compile_for_all_platforms_or_film_have_options_that_there
 @pytest.mark.slow
 def test_a_unit_brings_its_interpreter(folder: Path):
     succeeded(command_with(" --standalone "), folder)
-    (size,) = re.findall(r"`units/Push.fmi3-standalone.fmu`, (\d+) MB", README)
+    (size,) = re.findall(r"`units/Push.fmi3-standalone.fmu`, (\d+) MB", TEXT)
     file = folder / "units" / "Push.fmi3-standalone.fmu"
     assert file.stat().st_size < 40e6
     assert file.stat().st_size == pytest.approx(1e6 * float(size), rel=0.1)
@@ -196,7 +180,7 @@ def test_a_unit_brings_its_interpreter(folder: Path):
 
 @pytest.mark.slow
 def test_data_beside_a_unit_goes_along_with_it(tmp_path: Path):
-    (option,) = re.findall(r"`(--include (?:\S+))`", README)
+    (option,) = re.findall(r"`(--include (?:\S+))`", TEXT)
     file = option.split()[1]
     read = f"        self.k = params.k * float(Path(__file__).with_name({file!r}).read_text())\n"
     block = OWN_BLOCK.replace("        self.k = params.k\n", read)
@@ -217,7 +201,7 @@ def command_with(part: str) -> str:
 
 
 def block_with(part: str) -> str:
-    (block,) = (text for kind, text in BLOCKS if not kind and part in text)
+    (block,) = (text for text in blocks(TEXT) if part in text)
     return block
 
 
@@ -251,7 +235,7 @@ def test_a_block_of_ones_own_is_built(tmp_path: Path, monkeypatch: pytest.Monkey
     monkeypatch.delitem(sys.modules, "spring", raising=False)
     printed = program(OWN_BUILD, tmp_path, monkeypatch).strip()
     assert (tmp_path / printed).is_file()
-    (command,) = re.findall(r"`\.venv/bin/(handover build spring:Spring [^`]*)`", README)
+    (command,) = re.findall(r"`\.venv/bin/(handover build spring:Spring [^`]*)`", TEXT)
     assert printed in succeeded(command, tmp_path)
 
 

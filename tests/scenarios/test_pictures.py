@@ -1,4 +1,4 @@
-"""The README's pictures are made by a command, and show what figures look like today."""
+"""The pictures of README and site are made by a command, and show what figures look like today."""
 
 import importlib.util
 import re
@@ -7,24 +7,23 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from support.documentation import ROOT, TEXT
 
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.ir_grasp.plots import FINGER_COLOURS, FINGER_NAMES
 
-ROOT = Path(__file__).parent.parent.parent
 DOCS = ROOT / "docs"
 
 
-def test_every_picture_of_the_readme_is_made_by_the_command():
+def test_every_picture_is_shown_and_made_by_the_command():
     spec = importlib.util.spec_from_file_location("pictures", DOCS / "pictures.py")
     assert spec is not None
     assert spec.loader is not None
     pictures = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(pictures)
-    made = {*pictures.FIGURES, *pictures.EXPERIMENTS, pictures.REPORT}
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert set(re.findall(r"docs/(\w+\.(?:png|jpg))", readme)) == made
-    assert {p.name for p in DOCS.iterdir() if p.suffix in (".png", ".jpg")} == made
+    made = {*pictures.FIGURES, *pictures.EXPERIMENTS, pictures.REPORT, pictures.FILM}
+    assert set(re.findall(r"\]\([\w./]*?(\w+\.(?:png|jpg|gif))\)", TEXT)) == made
+    assert {p.name for p in DOCS.iterdir() if p.suffix in (".png", ".jpg", ".gif")} == made
     assert "\t$(BIN)/python docs/pictures.py" in (ROOT / "Makefile").read_text(encoding="utf-8")
 
 

@@ -11,8 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.commands import Command
+from support.documentation import TEXTS, blocks
 from support.processes import until
-from support.scenarios.tutorial import QUIET, SCENE, TUTORIAL, call, ran, signals, succeeded, write_files
+from support.scenarios.tutorial import QUIET, SCENE, call, ran, signals, succeeded, write_files
 
 from handover.cosim.record.reader import Record
 
@@ -100,9 +101,8 @@ def test_an_installed_package_adds_scenarios_and_units_by_name(tmp_path: Path):
 
 
 @pytest.mark.slow
-def test_the_readmes_commands_work_beside_the_tutorials_files(here: Path):
-    readme = (TUTORIAL.parents[1] / "README.md").read_text(encoding="utf-8")
-    lines = [line for line in readme.splitlines() if line.startswith("handover ")]
+def test_the_guides_commands_work_beside_the_tutorials_files(here: Path):
+    lines = [line for text in blocks(TEXTS["own"]) for line in text.splitlines() if line.startswith("handover ")]
     assert [line.split()[1] for line in lines] == ["list", "run", "sweep", "run", "sweep", "export"]
     for line in lines:
         ran(here, *shlex.split(line)[1:], *(QUIET if line.split()[1] in ("run", "sweep") else ()))
