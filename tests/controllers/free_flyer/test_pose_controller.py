@@ -49,7 +49,8 @@ class Robot:
         self.estimate = self.navigation.outputs(0.0, self.true())
 
     def measured(self, **changes: Any) -> Inputs:
-        return Inputs(**{**vars(self.estimate), "active": True, **changes})
+        given: dict[str, Any] = {**vars(self.estimate), "active": True, **changes}
+        return Inputs(**given)
 
     def true(self) -> NavigationInputs:
         return NavigationInputs(p_WB=self.y.p_WB, q_WB=self.y.q_WB, v_WB=self.y.v_WB, w_WB=self.y.w_WB)

@@ -1,4 +1,4 @@
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -62,7 +62,7 @@ def test_a_general_optimiser_finds_the_same_estimate():
 
         bound = NonlinearConstraint(miss, -np.inf, 0.5, jac=miss_slope)
         most: dict[str, Any] = {"ftol": 1e-12, "maxiter": 300}
-        general = minimize(cost, q_sys, jac=True, method="SLSQP", constraints=bound, options=most)
+        general: Any = cast("Any", minimize)(cost, q_sys, jac=True, method="SLSQP", constraints=bound, options=most)
         found = estimate(q_sys, X_meas).q_est
         assert general.success
         assert cost(found)[0] == pytest.approx(float(general.fun), rel=1e-9)

@@ -111,10 +111,11 @@ def test_one_camera_is_enough_but_says_that_it_knows_depth_less(camera: StereoCa
 
 def test_what_is_out_of_view_is_not_seen_and_its_place_repeated(camera: StereoCamera):
     u = hanging("left")
-    for away, seen, names in (
+    cases: list[tuple[dict[str, Any], tuple[bool, bool], tuple[str, ...]]] = [
         ({"p_WO": AWAY, "p_WH": AWAY}, (False, True), ("p_WO_meas", "cov_O")),
         ({"p_WR": AWAY}, (True, False), ("p_WR_meas", "cov_R", "p_WG_meas", "cov_G")),
-    ):
+    ]
+    for away, seen, names in cases:
         vision = HandoverVision(Params())
         first = look(camera, vision, u)
         assert (first.seen_O, first.seen_R) == (True, True)

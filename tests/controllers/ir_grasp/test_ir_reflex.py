@@ -188,11 +188,12 @@ def test_a_reading_that_is_no_number_is_refused_and_leaves_no_trace():
 
 def test_all_faults_of_the_parameters_are_reported_together(wording: Wording):
     no_probe, coarse = np.array([0.004, 0.004, 0.04, 0.0]), np.full(4, 0.01)
-    for bad in (
+    cases: list[dict[str, Any]] = [
         {"probe": no_probe, "weight": np.zeros(3), "damping": 0.0, "alpha": 0.0, "epsilon": 0.07, "b": 0.0},
         {"sigma_pregrasp": 0.9, "recovery_least": 0.02, "target": 0.003, "distance_max": 0.09, "tolerance": coarse},
         {"scans": 0},
-    ):
+    ]
+    for bad in cases:
         with pytest.raises(InvalidReflexParameters) as refused:
             IrReflex(Params(**bad))
         wording.check("\n".join(refused.value.faults))

@@ -2,6 +2,7 @@ import base64
 import contextlib
 import functools
 import json
+import operator
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -254,7 +255,7 @@ def test_what_is_no_model_is_refused(wording: Wording):
     for kind, place, value in without + FAULTS:
         changed = json.loads(texts[kind])
         *way, last = place.split()
-        at = functools.reduce(dict[str, Any].__getitem__, way, changed)
+        at = functools.reduce(operator.getitem, way, changed)
         if value is CUT:
             del at[last]
         else:

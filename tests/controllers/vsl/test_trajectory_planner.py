@@ -1,5 +1,6 @@
 import math
 import tracemalloc
+from dataclasses import replace
 from functools import partial
 from pathlib import Path as FilePath
 from typing import Any
@@ -152,7 +153,7 @@ CUSTOM: list[tuple[dict[str, Any], int]] = [
 def test_a_path_that_cannot_be_followed_is_refused(wording: Wording):
     for changes, faults in CUSTOM:
         with pytest.raises(InvalidPath) as caught:
-            TrajectoryPlanner(Params(**{"path": Path.CUSTOM, **changes}))
+            TrajectoryPlanner(replace(Params(path=Path.CUSTOM), **changes))
         assert len(caught.value.faults) == faults
         wording.check(caught.value)
 

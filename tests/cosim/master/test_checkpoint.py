@@ -35,7 +35,7 @@ from handover.cosim.record.reader import Record
 from handover.cosim.record.recorder import Recorder
 from handover.cosim.record.stream import complete_record
 from handover.cosim.stepping.options import AdaptiveStep, Algorithm, Extrapolation, MasterOptions
-from handover.cosim.system.signals import ObserveAfter, Observer
+from handover.cosim.system.signals import ObserveAfter, Observer, Signals
 from handover.cosim.system.system import System
 
 
@@ -132,7 +132,12 @@ def test_a_plan_that_goes_on_writes_the_record_by_itself(tmp_path: Path, monkeyp
     """Rows of Python's are the first of each run at most; 1/4 s is where no unit is due."""
     rows: list[float] = []
     add = Recorder.__call__
-    monkeypatch.setattr(Recorder, "__call__", lambda self, t, y: rows.append(t) or add(self, t, y))
+
+    def noted(self: Recorder, t: float, y: Signals) -> None:
+        rows.append(t)
+        add(self, t, y)
+
+    monkeypatch.setattr(Recorder, "__call__", noted)
     with Master(oscillator()) as master:
         master.run(Fraction(1, 7), [])
         c = take_checkpoint(master, 0)

@@ -116,7 +116,11 @@ def test_a_row_is_recorded_before_the_wait_so_that_who_watches_sees_the_first_on
     waited: list[tuple[float, int]] = []
     options = MasterOptions(algorithm=algorithm, pace=1.0)
     with Master(s, options) as master, Recorder(tmp_path / "a.parquet") as recorder:
-        monkeypatch.setattr(Pacer, "wait", lambda _self, t, _ended: waited.append((t, recorder.rows)))
+
+        def wait(self: Pacer, t: float, ended: object) -> None:  # noqa: ARG001
+            waited.append((t, recorder.rows))
+
+        monkeypatch.setattr(Pacer, "wait", wait)
         master.run(Fraction(3, 100), [recorder, lambda _t, _s: None])
     assert waited == [(pytest.approx(0.01 * k), k + 1) for k in range(4)]
 

@@ -1,6 +1,7 @@
 """A unit discards a step: it is repeated shorter by all, or the run ends and says so."""
 
 from fractions import Fraction
+from typing import Any
 
 import pytest
 from support.cosim.call_log import CallLog
@@ -50,7 +51,7 @@ def test_without_repetition_a_discarded_step_ends_the_run(fmi: int, reached: flo
     assert [c for unit, c in call_log.calls if unit == "short"][-2:] == [f"fmi{fmi}Terminate", f"fmi{fmi}FreeInstance"]
 
 
-def alone(unit: str, fmi: int, **start: float) -> System:
+def alone(unit: str, fmi: int, **start: Any) -> System:
     s = System()
     s.add("unit", native_fmu(unit, fmi), **start)
     return s

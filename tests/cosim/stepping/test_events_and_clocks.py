@@ -2,6 +2,7 @@
 
 import math
 from fractions import Fraction
+from typing import Any
 
 import pytest
 from support.cosim.native_units import native_fmu
@@ -176,7 +177,7 @@ def test_a_message_arrives_at_each_tick_also_where_it_is_the_same_again(box: str
     ],
 )
 def test_a_clock_of_parameters_or_one_that_changes_has_its_intervals(
-    unit: str, start: dict[str, float], ticks: list[float]
+    unit: str, start: dict[str, Any], ticks: list[float]
 ):
     s = System()
     s.add("unit", native_fmu(unit), period=Fraction(1), **start)
@@ -213,7 +214,7 @@ def test_an_iteration_between_two_units_settles_at_one_instant(most: int):
     assert set(rows.values()) == {(most, most)}
 
 
-def alone(unit: str, **start: float) -> System:
+def alone(unit: str, **start: Any) -> System:
     s = System()
     s.add(unit, native_fmu(unit), **start)
     s.add("other", native_fmu("integrator"), u=1.0)

@@ -27,7 +27,8 @@ def described(**facts: Any) -> FmuDescription:
         for name, causality in (("u", Causality.INPUT), ("y", Causality.OUTPUT))
     )
     none: dict[str, Any] = {"path": Path("none.fmu"), "fmi": 3, "name": "None", "identifier": "None", "token": ""}
-    given = {**none, **NOTHING, "step": None, "inputs": {"u": u}, "outputs": {"y": y}, "sampled": False, **facts}
+    own: dict[str, Any] = {"step": None, "inputs": {"u": u}, "outputs": {"y": y}, "sampled": False}
+    given: dict[str, Any] = {**none, **NOTHING, **own, **facts}
     return FmuDescription(**given)
 
 

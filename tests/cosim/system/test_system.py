@@ -1,5 +1,6 @@
 """What is wrong with a system is found before anything starts, all at once."""
 
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -81,8 +82,8 @@ def test_both_standards_describe_a_unit_alike(fmu: FmuOf, name: str):
 
 
 def ends(*facts: dict[str, Any]) -> list[FmuPort]:
-    given: dict[str, Any] = {"name": "x", "kind": Kind.REAL, "causality": Causality.OUTPUT, "fmi_type": ""}
-    return [FmuPort(**{**given, "references": (1,), **each}) for each in facts]
+    x = FmuPort(name="x", kind=Kind.REAL, causality=Causality.OUTPUT, fmi_type="", references=(1,))
+    return [replace(x, **each) for each in facts]
 
 
 @pytest.mark.parametrize(

@@ -173,7 +173,7 @@ def test_all_that_was_tried_is_told_with_a_cure(unpacked: CtypesHost, tmp_path: 
         if environment.get("FMU_LIBPYTHON") == f"TMP/{name}":
             alike(tmp_path, name)
     places = {"UNIT": str(unpacked.library._name), "TMP": str(tmp_path)}
-    filled = {k: re.sub("^(UNIT|TMP)", lambda m: places[m[1]], v) for k, v in environment.items()}
+    filled: dict[str, Any] = {k: re.sub("^(UNIT|TMP)", lambda m: places[m[1]], v) for k, v in environment.items()}
     done = run(unpacked, **filled)
     expect_refusal(done, "fmi2Instantiate: ", *told.split("|"))
     assert done.stdout.count("Cure: ") in ((1,) if case.startswith("no interpreter") else (1, 2))

@@ -110,7 +110,8 @@ def test_who_lets_go_before_the_fingers_have_closed_lets_the_object_float():
     early: list[bool] = []
     spread: list[dict[str, Any]] = [{"timing_error": 0.5, "seed": seed} for seed in range(6)]
     for changes in (*spread, {"haste": 1.0}, {"haste": 0.0}):
-        scene = giving(replace(GIVING, reaction_time=0.1, **(STRONG | changes)))
+        both: dict[str, Any] = STRONG | changes
+        scene = giving(replace(GIVING, reaction_time=0.1, **both))
         scene.go(0.5)
         scene.until(Activity.LET_GO, closure=1.0)
         early.append(scene.y.gripper_angle > 0.79)

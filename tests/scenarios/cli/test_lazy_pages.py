@@ -57,7 +57,9 @@ def test_help_and_lists_load_no_physics_plots_or_records():
 def test_a_command_is_in_the_help_as_it_says_itself(name: str):
     context = click.Context(main)
     deferred, loaded = main.get_command(context, name), main.resolve_command(context, [name])[1]
-    assert deferred is not loaded is not None is not deferred
+    assert deferred is not None
+    assert loaded is not None
+    assert deferred is not loaded
     assert loaded.name == name
     for width in (20, 50, 120):
         assert deferred.get_short_help_str(width) == loaded.get_short_help_str(width)

@@ -132,7 +132,8 @@ def test_runs_with_anything_amiss_are_not_compared_with_the_paper():
 
 
 def test_what_no_camera_sees_is_refused_before_anything_starts(wording: Wording):
-    for given in ({"box_height": -2.0}, {"marker": 0.012}, {"marker": 0.03}):
+    cases: list[dict[str, Any]] = [{"box_height": -2.0}, {"marker": 0.012}, {"marker": 0.03}]
+    for given in cases:
         with pytest.raises(WiringError) as caught:
             built(**given).check()
         wording.check(caught.value)

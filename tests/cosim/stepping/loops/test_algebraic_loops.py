@@ -198,7 +198,12 @@ def test_a_loop_without_a_solution_fails_with_its_name(algorithm: Algorithm):
 def test_directional_derivatives_take_the_place_of_differences(fmi: int, monkeypatch: pytest.MonkeyPatch):
     found: list[Floats] = []
     chained = ChainedDerivatives.__call__
-    monkeypatch.setattr(ChainedDerivatives, "__call__", lambda self: found.append(chained(self)) or found[-1])
+
+    def noted(self: ChainedDerivatives) -> Floats:
+        found.append(chained(self))
+        return found[-1]
+
+    monkeypatch.setattr(ChainedDerivatives, "__call__", noted)
     flag = "providesDirectionalDerivative" + ("" if fmi == 2 else "s")
     a, b, c = GAINS
     A = np.array([[0, 0, a], [b, 0, 0], [0, 100.0 * c, 0]])
