@@ -136,7 +136,7 @@ def test_the_page_of_all_units_has_each_with_its_icon_and_ports(tmp_path: Path, 
 
 def test_a_start_value_without_a_number_and_a_name_without_end_are_shown(tmp_path: Path):
     def odd(text: str) -> str:
-        return text.replace('start="1.0"', 'start=""').replace('"spring" ins', f'"{"s" * 10**6}" ins')
+        return text.replace('start="1.0"', 'start=""').replace('modelName="spring"', f'modelName="{"s" * 10**6}"')
 
     file = described_otherwise(native_fmu("spring", 3), tmp_path / "odd.fmu", odd)
     assert {p["name"]: p["start"] for p in data_of("info", file)["parameters"]} == {"k": [], "d": 0.0}
