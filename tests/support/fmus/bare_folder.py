@@ -43,6 +43,12 @@ class Stepped:
     outputs: list[str]
     messages: str
 
+    def figure(self, pattern: str) -> float:
+        """Return the number in a message."""
+        found = re.search(pattern, self.messages)
+        assert found, self.messages
+        return float(found[1])
+
 
 class BareFolder:
     """The root folder.
