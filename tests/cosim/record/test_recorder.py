@@ -229,7 +229,7 @@ print(record("short.parquet", 20_000), record("long.parquet", 60_000))
 def test_a_record_of_six_million_values_takes_no_more_memory_than_one_of_two(tmp_path: Path):
     pytest.importorskip("resource")
     done = subprocess.run(
-        [sys.executable, "-c", f"import sys; sys.path.insert(0, {str(Path(__file__).parents[1])!r})\n{PROGRAM}"],
+        [sys.executable, "-c", f"import sys; sys.path.insert(0, {str(Path(__file__).parents[2])!r})\n{PROGRAM}"],
         cwd=tmp_path,
         check=True,
         capture_output=True,
