@@ -38,8 +38,6 @@ html_copy_source = False
 html_extra_path = ["build/files"]
 copybutton_exclude = ".linenos, .gp, .go"
 
-declared_pages.write(DOCS, DOCS / "build" / "files")
-
 
 def set_code(app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]) -> None:  # noqa: ARG001
     """Show what is indented after a line that ends with a colon, as docstrings have their examples, as code."""
@@ -49,5 +47,6 @@ def set_code(app: Sphinx, what: str, name: str, obj: object, options: object, li
 
 
 def setup(app: Sphinx) -> None:
-    """Called by Sphinx."""
+    """Write what is made, before Sphinx looks for sources and files."""
+    declared_pages.write(DOCS, DOCS / "build" / "files")
     app.connect("autodoc-process-docstring", set_code)

@@ -5,6 +5,7 @@ the blocks declare, laws their docstrings, and the origins of a scenario's value
 """
 
 import enum
+import inspect
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -76,8 +77,7 @@ def scenario(kind: type[Experiment[Any]], system: RobotSystem) -> dict[str, Any]
     parameters = kind.parameters()
     return {
         "title": kind.title,
-        "system": system,
-        "doc": parse(_unindented(kind.__doc__ or "")),
+        "doc": parse(inspect.cleandoc(kind.__doc__ or "")),
         "units": dict(kind.units),
         "parameters": _rows(system.package, parameters),
         "enumerations": [(e.__name__, items(e)) for e in _enumerations(parameters)],
@@ -88,12 +88,6 @@ def scenario(kind: type[Experiment[Any]], system: RobotSystem) -> dict[str, Any]
 def cell(text: object) -> str:
     """Return a text as it stands in a cell of a table in Markdown."""
     return str(text).replace("|", "\\|").replace("\n", " ").replace("*", "\\*").replace("<", "&lt;")
-
-
-def _unindented(doc: str) -> str:
-    first, _, rest = doc.partition("\n")
-    lines = rest.split("\n")
-    return "\n".join([first, *(line.removeprefix("    ") for line in lines)])
 
 
 def _feedthrough(d: Description) -> list[tuple[str, str]]:

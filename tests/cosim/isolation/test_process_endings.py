@@ -15,7 +15,7 @@ import pytest
 from support.cosim.call_log import CallLog, fed_by
 from support.cosim.native_units import native_fmu
 from support.faults.faulty_units import faulty_fmu
-from support.processes import lives, until
+from support.processes import lives, until, with_path
 
 from handover.cosim.exceptions import InitializationError, UnitFailure
 from handover.cosim.fmu.failures import UnitCrashed, UnitFatal, UnitHung
@@ -135,7 +135,6 @@ def test_a_request_to_end_is_that_of_one_process(fmi: int, algorithm: Algorithm,
 _RUN = """
 import sys
 from fractions import Fraction
-sys.path.insert(0, {tests!r})
 from support.cosim.native_units import native_fmu
 from handover.cosim.master.master import Master
 from handover.cosim.stepping.options import MasterOptions
@@ -151,8 +150,7 @@ with Master(s, MasterOptions(isolated=("all",))) as master:
 
 
 def test_no_process_is_left_when_the_master_is_killed():
-    tests = str(Path(__file__).parents[2])
-    with subprocess.Popen([sys.executable, "-c", _RUN.format(tests=tests)], stdout=subprocess.PIPE) as run:
+    with subprocess.Popen([sys.executable, "-c", _RUN], env=with_path(), stdout=subprocess.PIPE) as run:
         assert run.stdout is not None
         hosts = [int(pid) for pid in run.stdout.readline().split()]
         assert [lives(pid) for pid in hosts] == [True, True]

@@ -11,6 +11,7 @@ import pyarrow as pa
 import pytest
 from numpy.typing import NDArray
 from support.cosim.signals_of import signals_of
+from support.processes import with_path
 
 from handover.cosim.exceptions import RecordNotWritten
 from handover.cosim.files import FileLocked
@@ -229,7 +230,8 @@ print(record("short.parquet", 20_000), record("long.parquet", 60_000))
 def test_a_record_of_six_million_values_takes_no_more_memory_than_one_of_two(tmp_path: Path):
     pytest.importorskip("resource")
     done = subprocess.run(
-        [sys.executable, "-c", f"import sys; sys.path.insert(0, {str(Path(__file__).parents[2])!r})\n{PROGRAM}"],
+        [sys.executable, "-c", PROGRAM],
+        env=with_path(),
         cwd=tmp_path,
         check=True,
         capture_output=True,
