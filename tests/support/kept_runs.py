@@ -1,6 +1,7 @@
 """Runs and other folders that commands write, made once for all tests and kept as long as what they depend on.
 
-That is the product's code, the packages of this environment, and the command's arguments.
+That is the product's code, the packages of this environment, and the command's arguments. They are kept in the virtual
+environment that made them: a unit's bytes name its interpreter, so that those of another environment differ.
 """
 
 import contextlib
@@ -15,16 +16,16 @@ from pathlib import Path
 
 import handover
 from handover.cosim.files import FileLocked, lock_file
-from handover.cosim.native_libraries import cache_folder
 from support.commands import Command
 
 _ROOT = Path(handover.__file__).resolve().parent.parent
 _PRODUCT = ("controllers", "cosim", "fmus", "plants", "scenarios")
+_KEPT = Path(sys.prefix) / "test-runs"
 _MOST = 1800.0
 """Seconds that a run may take on a machine with much else to do; a handover takes half a minute alone."""
 
 _KEPT_FOR = 86_400.0
-"""Seconds for which runs of other code are kept, as of another clone."""
+"""Seconds for which runs of other code are kept, as of another branch."""
 
 
 def kept_run(*arguments: str) -> Path:
@@ -33,7 +34,7 @@ def kept_run(*arguments: str) -> Path:
     `kept_run("run", "ir_grasp")` has the record, figures and page, `kept_run("run", "ir_grasp", "--no-report")` neither
     figures nor page, at a third of the time. A run that is judged to have failed is one, too.
     """
-    of_code = cache_folder().absolute() / "test-runs" / _code()
+    of_code = _KEPT / _code()
     folder = of_code / hashlib.sha256(repr(arguments).encode()).hexdigest()[:16]
     wanted = folder / arguments[1].rpartition("/")[2]
     of_code.mkdir(parents=True, exist_ok=True)
@@ -63,10 +64,9 @@ def _code() -> str:
             if file.is_file() and not {"bin", "__pycache__"} & set(file.parts):
                 digest.update(f"\0{file.relative_to(_ROOT)}\0".encode() + file.read_bytes())
     key = digest.hexdigest()[:16]
-    kept = cache_folder() / "test-runs"
-    (kept / key).mkdir(parents=True, exist_ok=True)
-    (kept / key / "used").touch()
-    for other in kept.iterdir():
+    (_KEPT / key).mkdir(parents=True, exist_ok=True)
+    (_KEPT / key / "used").touch()
+    for other in _KEPT.iterdir():
         with contextlib.suppress(OSError):
             if time.time() - (other / "used").stat().st_mtime > _KEPT_FOR:
                 shutil.rmtree(other, ignore_errors=True)
