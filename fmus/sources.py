@@ -72,10 +72,18 @@ def distributions_by_module() -> dict[str, list[str]]:
     """Return distributions by top-level module; `packages_distributions` of Python 3.10 misses most of them."""
     by_module: dict[str, set[str]] = {}
     for distribution in metadata.distributions():
-        listed = (distribution.read_text("top_level.txt") or "").split()
-        for top in listed or {file.parts[0].partition(".")[0] for file in distribution.files or ()}:
-            by_module.setdefault(top, set()).add(distribution.metadata["Name"])
+        name = distribution.metadata["Name"]
+        for top in _top_levels(distribution):
+            by_module.setdefault(top, set()).add(name)
     return {top: sorted(names) for top, names in by_module.items()}
+
+
+def _top_levels(distribution: metadata.Distribution) -> set[str]:
+    """Return what a distribution installs at the top; its files are read as text, for they are thousands."""
+    if listed := (distribution.read_text("top_level.txt") or "").split():
+        return {*listed}
+    files = (distribution.read_text("RECORD") or "").splitlines() or map(str, distribution.files or ())
+    return {re.split(r"[/,.]", file.lstrip('"'), maxsplit=1)[0] for file in files}
 
 
 def closure(block: str) -> Carried:

@@ -29,9 +29,12 @@ def note_libraries(heartbeat: Heartbeat, units: Mapping[Path, Sequence[str]]) ->
     with contextlib.suppress(OSError):  # Linux has the file
         for line in _MAPS.read_text(encoding="utf-8", errors="replace").splitlines():
             place, _, path = line.partition("/")
+            span, rights, *_ = place.split()
+            if "x" not in rights:
+                continue
             names = next((names for folder, names in folders.items() if f"/{path}".startswith(folder)), None)
-            if names is not None and "x" in place.split()[1]:
-                low, high = (int(number, 16) for number in place.split()[0].split("-"))
+            if names is not None:
+                low, high = (int(number, 16) for number in span.split("-"))
                 libraries.append((low, high, names))
     threads = {threading.main_thread().native_id, threading.get_native_id()}
     heartbeat.record_facts(threads=sorted(t for t in threads if t is not None), libraries=libraries)

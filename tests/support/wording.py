@@ -6,6 +6,7 @@
 import os
 import re
 from collections import defaultdict
+from functools import cache
 from pathlib import Path
 from textwrap import indent
 
@@ -50,6 +51,7 @@ def write_golden(collected: "set[str]", deselected: "set[str]") -> None:
     _FILE.write_text("\n\n".join(blocks) + "\n", encoding="utf-8")
 
 
+@cache
 def _golden() -> dict[str, list[str]]:
     if not _FILE.is_file():
         return {}
