@@ -1,3 +1,4 @@
+from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
 
@@ -5,6 +6,7 @@ import pytest
 from support.cosim import decay
 from support.cosim.fmu_of import FmuOf
 from support.cosim.native_units import Edited, native_fmu
+from support.forked_probes import ForkedProbes, forked_probes
 from support.rewritten_archive import rewritten
 
 from handover.fmus.build import build_block
@@ -46,3 +48,10 @@ def edited(tmp_path: Path) -> Edited:
         return rewritten(native_fmu(unit, fmi), file, rewrite)
 
     return edit
+
+
+@pytest.fixture
+def probes() -> Iterator[ForkedProbes]:
+    """Checks fork their processes."""
+    with forked_probes() as probes:
+        yield probes

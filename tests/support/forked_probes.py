@@ -1,4 +1,7 @@
-"""Parts of a check in processes that are forked from a warm one, as each start of Python takes longer than the part."""
+"""Parts of a check in processes that are forked from a warm one, as each start of Python takes longer than the part.
+
+Nor does FMPy make its grammar of names for each check anew.
+"""
 
 import contextlib
 import importlib
@@ -7,14 +10,20 @@ import os
 import subprocess
 import time
 from collections.abc import Generator, Mapping, Sequence
+from functools import cache
 from multiprocessing import forkserver
 from pathlib import Path
 from types import SimpleNamespace
-from typing import BinaryIO
+from typing import Any, BinaryIO
 from unittest.mock import patch
 
 from handover.cosim.probe import isolated_process
 from support.commands import forking
+
+
+@cache
+def _lark(*given: Any, **options: Any) -> Any:
+    return importlib.import_module("lark.lark").Lark(*given, **options)  # not in the processes that are forked
 
 
 class ForkedProbes:
@@ -33,7 +42,8 @@ def forked_probes() -> Generator[ForkedProbes, None, None]:
     def popen(command: Sequence[str], *, stdout: BinaryIO, **_options: object) -> _ForkedProbe:
         return _ForkedProbe(command, stdout, probes)
 
-    with patch.object(isolated_process, "subprocess", SimpleNamespace(**{**vars(subprocess), "Popen": popen})):
+    forked = SimpleNamespace(**{**vars(subprocess), "Popen": popen})
+    with patch.object(isolated_process, "subprocess", forked), patch("lark.Lark", _lark):
         yield probes
 
 

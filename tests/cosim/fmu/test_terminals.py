@@ -12,6 +12,8 @@ from handover.cosim.fmu.file.description import describe_fmu
 from handover.cosim.fmu.file.terminals import TerminalMember
 from handover.cosim.probe.finding import Level
 
+pytestmark = pytest.mark.usefixtures("probes")
+
 INPUTS, OUTPUTS = {"f": "N 3", "u": "N"}, {"p": "m 3", "y": "m"}
 
 
@@ -19,9 +21,11 @@ def unit(folder: Path, *terminals: str, scalar: bool = False) -> Path:
     return described_unit(folder / "unit.fmu", INPUTS, OUTPUTS, "".join(terminals), scalar=scalar)
 
 
-def found(file: Path, level: Level = Level.FAULT) -> str:
+def found(file: Path) -> tuple[str, str]:
+    """Return the faults and the notes of a check."""
     (section,) = (s for s in check_fmu(file, timeout=5.0).sections if s.name == "description")
-    return "\n".join(f.line for f in section.findings if f.level is level)
+    faults, notes = ("\n".join(f.line for f in section.findings if f.level is x) for x in (Level.FAULT, Level.NOTE))
+    return faults, notes
 
 
 def test_rules_kinds_and_members_are_read_and_terminals_within_others_are_named_after_them(tmp_path: Path):
@@ -32,7 +36,7 @@ def test_rules_kinds_and_members_are_read_and_terminals_within_others_are_named_
     assert (flange.rule, flange.kind, flange.reason) == (MatchingRule.PLUG, "Some.Flange", "")
     assert flange.members == (TerminalMember("F", "f", "inflow"), TerminalMember("P", "p", "signal"))
     assert (within.rule, within.members) == (MatchingRule.BUS, (TerminalMember("Y", "y", "signal"),))
-    assert found(file) == found(file, Level.NOTE) == ""
+    assert found(file) == ("", "")
 
 
 def entries(order: str, names: str = "123") -> str:
@@ -78,7 +82,7 @@ def test_what_breaks_the_standard_is_told_and_keeps_no_unit_from_being_described
     tmp_path: Path, terminals: str, wording: Wording
 ):
     file = unit(tmp_path, terminals)
-    wording.check(found(file))
+    wording.check(found(file)[0])
     assert set(describe_fmu(file).outputs) == {"p", "y"}
 
 
@@ -95,6 +99,7 @@ def test_what_breaks_the_standard_is_told_and_keeps_no_unit_from_being_described
 )
 def test_what_the_standard_allows_and_is_not_connected_here_is_a_note(tmp_path: Path, terminals: str, wording: Wording):
     file = unit(tmp_path, terminals, scalar="p[" in terminals)
-    assert found(file) == ""
-    wording.check(found(file, Level.NOTE))
-    assert describe_fmu(file).terminals.by_name["t"].reason in found(file, Level.NOTE)
+    faults, notes = found(file)
+    assert faults == ""
+    wording.check(notes)
+    assert describe_fmu(file).terminals.by_name["t"].reason in notes

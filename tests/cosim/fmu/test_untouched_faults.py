@@ -18,6 +18,8 @@ from handover.cosim.master.master import Master
 from handover.cosim.stepping.options import MasterOptions
 from handover.cosim.system.system import System
 
+pytestmark = pytest.mark.usefixtures("probes")
+
 STATE2 = '<ScalarVariable name="s" valueReference="90" causality="local" variability="continuous"><Real {}/>'
 STATE3 = '<Float64 name="s" valueReference="90" causality="local" variability="continuous" {}/>'
 
@@ -147,8 +149,7 @@ def test_a_fault_in_what_co_simulation_reads_is_refused_as_a_check_says(
         assert f"is not valid: {found.where}: {found.what}; {found.cure}" in str(refused.value)
 
 
-@pytest.mark.parametrize("fmi", [2, 3])
-@pytest.mark.parametrize("step", ["NaN", "1e-300", "-1", "soon"])
+@pytest.mark.parametrize(("step", "fmi"), [("NaN", 2), ("1e-300", 3), ("-1", 2), ("soon", 3)])
 def test_a_step_that_is_none_is_warned_of_and_another_taken(edited: Edited, fmi: int, step: str):
     file = edited("mass", fmi, ('stepSize="0.01"', f'stepSize="{step}"'))
     where = f"stepSize='{step}' of its DefaultExperiment (line "
