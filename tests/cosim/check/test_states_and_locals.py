@@ -99,7 +99,7 @@ def test_a_unit_with_event_mode_is_tried_as_in_a_run(tmp_path: Path, announces: 
     assert seen == pytest.approx([k / 10 for k in range(1, 11)])
 
 
-@pytest.mark.parametrize("unit", ["ball", "counter_tenths", "watch"])
+@pytest.mark.parametrize("unit", ["ball", "counter_tenths"])
 def test_units_with_event_mode_pass(unit: str):
     report = check_fmu(native_fmu(unit), timeout=60.0)
     assert report.passed, [f.line for s in report.sections for f in s.findings]
@@ -108,12 +108,9 @@ def test_units_with_event_mode_pass(unit: str):
 
 UNLISTED = "an output that ModelStructure does not list among the outputs; a run takes it to depend on all inputs"
 INVALID = [
-    (2, ('<Real start="1.0" />', '<Real start="1.0" min="3" max="2" />'), "its min 3 is above its max 2"),
     (3, ('start="1.0"', 'start="1.0" min="3" max="2"'), "its min 3 is above its max 2"),
     (2, ('<Real start="1.0" />', '<Real start="1.0" max="0.5" />'), "start value 1.0 is out of its range"),
-    (2, ('<Unknown index="2" dependencies="1" />', ""), UNLISTED),
     (3, ('<Output valueReference="2" dependencies="1" />', ""), UNLISTED),
-    (3, ('startTime="0" stopTime="1"', 'startTime="2" stopTime="1"'), "stopTime is before startTime"),
 ]
 
 

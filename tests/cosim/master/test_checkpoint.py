@@ -81,17 +81,15 @@ def test_a_checkpoint_that_cannot_be_written_is_reported_and_the_run_goes_on(
 
 
 MOTION, LINEAR = ("a.x", "b.v", "between.f1"), Extrapolation.LINEAR
+FIXED_POINT = Algorithm.FIXED_POINT  # which keeps what Newton's keeps
 
 
 @pytest.mark.parametrize(
     ("build", "names", "options"),
     [
-        *(pytest.param(oscillator, MOTION, {"algorithm": a}, id=a.value) for a in Algorithm),
+        *(pytest.param(oscillator, MOTION, {"algorithm": a}, id=a.value) for a in Algorithm if a is not FIXED_POINT),
         pytest.param(oscillator, MOTION, {"compiled": False, "extrapolation": LINEAR}, id="linear"),
         pytest.param(oscillator, MOTION, {"adaptive": AdaptiveStep(), "extrapolation": LINEAR}, id="adaptive"),
-        pytest.param(oscillator, MOTION, {"adaptive": AdaptiveStep(), "algorithm": Algorithm.NEWTON}, id="both"),
-        pytest.param(oscillator, MOTION, {"repeat_discarded": True}, id="discarding"),
-        pytest.param(bouncing, BOUNCING, {"algorithm": Algorithm.JACOBI}, id="events, jacobi"),
         pytest.param(bouncing, BOUNCING, {}, id="events"),
         pytest.param(counting, COUNTING, {"algorithm": Algorithm.JACOBI}, id="clocks"),
     ],
@@ -99,7 +97,7 @@ MOTION, LINEAR = ("a.x", "b.v", "between.f1"), Extrapolation.LINEAR
 def test_a_run_goes_on_from_a_checkpoint(
     build: Callable[[], System], names: tuple[str, ...], options: dict[str, Any], tmp_path: Path
 ):
-    """Taken at the start, amid steps of slow units, at the ball's impact at 0.45 s, and behind it."""
+    """Taken at the start, at the ball's impact at 0.45 s, and behind it, amid steps of slow units."""
     taken = list[Checkpoint]()
     rows: dict[float, tuple[float, ...]] = {}
 
@@ -109,13 +107,13 @@ def test_a_run_goes_on_from_a_checkpoint(
         return dict(rows), str(master.iterations), getattr(master.stepper, "statistics", None)
 
     def take(t: float, _y: object) -> None:
-        if len(taken) < 4 and t >= (0.0, 0.3, 0.45, 0.62)[len(taken)]:
+        if len(taken) < 3 and t >= (0.0, 0.45, 0.62)[len(taken)]:
             taken.append(take_checkpoint(master, len(rows)))
 
     with Master(build(), MasterOptions(cpu_times=True, **options)) as master:
         whole, *counts = run_on(master, take)
     assert isinstance(whole, dict)
-    assert len(taken) == 4
+    assert len(taken) == 3
     for checkpoint in taken:
         write_checkpoint(tmp_path / "checkpoint", checkpoint)
         with Master(build(), MasterOptions(cpu_times=True, **options)) as master:

@@ -29,7 +29,7 @@ from handover.cosim.stepping.options import MasterOptions
 from handover.cosim.system.system import System
 
 
-@pytest.mark.parametrize(("fmi", "compiled"), [(2, False), (3, False), (3, True)])
+@pytest.mark.parametrize(("fmi", "compiled"), [(2, False), (3, False)])
 @pytest.mark.parametrize(
     ("bad", "kind", "facts", "left"),
     [

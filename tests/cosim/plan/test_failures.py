@@ -20,10 +20,14 @@ from handover.cosim.stepping.options import Algorithm
 from handover.cosim.system.system import System
 
 
-@pytest.mark.parametrize(("algorithm", "fmi"), [(Algorithm.JACOBI, 2), (Algorithm.GAUSS_SEIDEL, 3)])
 @pytest.mark.parametrize(
-    ("unit", "failure"),
-    [("errs", UnitError), ("fatal", UnitFatal), ("gives_nan", NotFinite), ("gives_infinity", NotFinite)],
+    ("unit", "failure", "algorithm", "fmi"),
+    [
+        ("errs", UnitError, Algorithm.JACOBI, 2),
+        ("fatal", UnitFatal, Algorithm.GAUSS_SEIDEL, 3),
+        ("gives_nan", NotFinite, Algorithm.GAUSS_SEIDEL, 2),
+        ("gives_infinity", NotFinite, Algorithm.JACOBI, 3),
+    ],
 )
 def test_failures_in_the_midst_of_a_run(
     unit: str, failure: type[UnitFailure], fmi: int, algorithm: Algorithm, tmp_path: Path
@@ -41,12 +45,11 @@ def test_failures_in_the_midst_of_a_run(
     assert pq.read_table(file)["time"].to_pylist() == [k / 10 for k in range(41)]
 
 
-@pytest.mark.parametrize("fmi", [2, 3])
-def test_a_step_that_is_discarded_fails_and_numbers_that_nobody_reads_do_not(fmi: int, tmp_path: Path):
+def test_a_step_that_is_discarded_fails_and_numbers_that_nobody_reads_do_not(tmp_path: Path):
     s = System()
-    s.add("faulty", native_fmu("gives_nan", fmi))
+    s.add("faulty", native_fmu("gives_nan", 2))
     assert expect_alike(lambda: s, Fraction(1), tmp_path, Algorithm.JACOBI).failure is None
-    s.add("short", native_fmu("discards", fmi), period=Fraction(1), longest=0.5)
+    s.add("short", native_fmu("discards", 3), period=Fraction(1), longest=0.5)
     assert isinstance(expect_alike(lambda: s, Fraction(10), tmp_path, Algorithm.JACOBI).failure, UnitDiscarded)
 
 

@@ -22,8 +22,15 @@ def order(system: Callable[[Fraction], System], options: MasterOptions) -> float
     return math.log2(coarse / fine)
 
 
-@pytest.mark.parametrize("algorithm", list(Algorithm))
-@pytest.mark.parametrize(("extrapolation", "expected"), [(HOLD, 1), (LINEAR, 2)])
+@pytest.mark.parametrize(
+    ("algorithm", "extrapolation", "expected"),
+    [
+        (Algorithm.JACOBI, HOLD, 1),
+        (Algorithm.NEWTON, HOLD, 1),
+        (Algorithm.GAUSS_SEIDEL, LINEAR, 2),
+        (Algorithm.FIXED_POINT, LINEAR, 2),
+    ],
+)
 def test_units_that_have_either_states_or_feedthrough(
     algorithm: Algorithm, extrapolation: Extrapolation, expected: int
 ):
@@ -34,7 +41,7 @@ def test_units_that_have_either_states_or_feedthrough(
 @pytest.mark.parametrize(
     ("extrapolation", "fmi", "expected", "algorithm"),
     [
-        *((HOLD, 2, 1, algorithm) for algorithm in (Algorithm.GAUSS_SEIDEL, Algorithm.FIXED_POINT)),
+        (HOLD, 2, 1, Algorithm.FIXED_POINT),
         *((LINEAR, 2, 2, algorithm) for algorithm in (Algorithm.JACOBI, Algorithm.GAUSS_SEIDEL, Algorithm.NEWTON)),
         (LINEAR, 3, 1, Algorithm.GAUSS_SEIDEL),  # one held value
     ],
@@ -49,22 +56,21 @@ def test_a_unit_with_both_state_and_feedthrough(
 STRONGLY = equal_masses(k_c=4000.0, d_c=8.0)
 
 
-def end(algorithm: Algorithm, fmi: int = 3, **options: Any) -> tuple[Floats, Master]:
-    with Master(STRONGLY.two_units(Fraction(1, 10), fmi), MasterOptions(algorithm=algorithm, **options)) as master:
+def end(algorithm: Algorithm, **options: Any) -> tuple[Floats, Master]:
+    with Master(STRONGLY.two_units(Fraction(1, 10), 3), MasterOptions(algorithm=algorithm, **options)) as master:
         master.run(Fraction(2))
         return np.array([float(master.signals[name]) for name in STATES]), master
 
 
-@pytest.mark.parametrize("fmi", [2, 3])
-def test_the_iterated_coupling_reaches_the_monolithic_solution_where_others_diverge(fmi: int):
-    (slow, one), (fast, other) = end(Algorithm.FIXED_POINT, fmi), end(Algorithm.NEWTON, fmi)
+def test_the_iterated_coupling_reaches_the_monolithic_solution_where_others_diverge():
+    (slow, one), (fast, other) = end(Algorithm.FIXED_POINT), end(Algorithm.NEWTON)
     for state in (slow, fast):
         assert state == pytest.approx(STRONGLY.implicit(0.1, 20), abs=1e-6)
     assert np.max(np.abs(slow)) < 1.5
     assert one.iterations.steps == other.iterations.steps == 20
     assert other.iterations.iterations < one.iterations.iterations
     assert other.iterations.rollbacks < one.iterations.rollbacks
-    assert np.max(np.abs(end(Algorithm.JACOBI, fmi)[0])) > 1e6
+    assert np.max(np.abs(end(Algorithm.JACOBI)[0])) > 1e6
     assert STRONGLY.gain(0.1) < -2.0  # plain fixed-point iteration would diverge, too
 
 

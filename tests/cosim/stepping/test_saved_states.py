@@ -22,10 +22,13 @@ from handover.cosim.system.system import System
 OPTIONS = {
     "newton": MasterOptions(algorithm=Algorithm.NEWTON),
     "adaptive": MasterOptions(adaptive=AdaptiveStep()),
-    "adaptive newton": MasterOptions(algorithm=Algorithm.NEWTON, adaptive=AdaptiveStep()),
     "events": MasterOptions(repeat_discarded=True),
+    "adaptive newton": MasterOptions(algorithm=Algorithm.NEWTON, adaptive=AdaptiveStep()),
     "events newton": MasterOptions(algorithm=Algorithm.NEWTON, repeat_discarded=True),
 }
+
+
+FAULTS = ("errs", "gives_nan", "ends", "fatal")
 
 
 def cycle(fault: str, fmi: int, at: float = 0.4) -> System:
@@ -47,9 +50,12 @@ def kept(call_log: CallLog, fmi: int) -> dict[str, int]:
 
 
 @pytest.mark.parametrize(
-    ("way", "fmi"), [*((way, 3) for way in OPTIONS), ("newton", 2), ("adaptive", 2), ("events", 2)]
+    ("fault", "way", "fmi"),
+    [
+        *((fault, way, 2 + (i + k) % 2) for i, fault in enumerate(FAULTS) for k, way in enumerate(OPTIONS) if k < 3),
+        *((fault, way, 3) for fault in ("errs", "fatal") for way in ("adaptive newton", "events newton")),
+    ],
 )
-@pytest.mark.parametrize("fault", ["errs", "gives_nan", "ends", "fatal"])
 def test_states_are_freed_unless_their_unit_must_not_be_called(fault: str, fmi: int, way: str):
     call_log = CallLog()
     with (

@@ -50,18 +50,6 @@ def test_steps_that_are_no_multiples_of_each_other_are_recorded_where_they_end()
     assert [y for (y,) in seen.values()] == pytest.approx([0.0, 0.1, 0.2, 0.2, 0.3, 0.4, 0.5])
 
 
-def test_the_general_path_and_units_in_processes_of_their_own_have_the_same_values():
-    rows = [
-        observed_rows(integrators(Fraction(1, 4), Fraction(1, 10)), Fraction(2), *SIGNALS, options=options)
-        for options in (
-            MasterOptions(),
-            MasterOptions(isolated=("slow",)),
-            MasterOptions(isolated=("all",), compiled=False),
-        )
-    ]
-    assert rows == rows[:1] * len(rows)
-
-
 def test_where_the_step_adapts_results_do_not_depend_on_the_rates_that_units_ask_for():
     step = AdaptiveStep(initial=Fraction(1, 10), largest=Fraction(1, 10))
     rows = [

@@ -50,8 +50,10 @@ def solution() -> list[float]:
     return np.linalg.solve(np.eye(3) - np.array([[0, 0, a], [b, 0, 0], [0, c, 0]]), np.ones(3)).tolist()
 
 
-@pytest.mark.parametrize("algorithm", list(Algorithm))
-@pytest.mark.parametrize(("fmi", "dependencies"), [(2, True), (3, True), (2, False), (3, False)])
+@pytest.mark.parametrize(
+    ("algorithm", "fmi", "dependencies"),
+    [(a, 2 + (i + d) % 2, d) for i, a in enumerate(Algorithm) for d in (False, True)],
+)
 def test_a_loop_of_three_units_is_solved_at_the_start_and_at_the_steps(
     algorithm: Algorithm, fmi: int, dependencies: bool
 ):
@@ -72,8 +74,7 @@ def driven(sampled: bool = False, **flags: Any) -> System:
     return s
 
 
-@pytest.mark.parametrize("sampled", [False, True])
-@pytest.mark.parametrize("algorithm", list(Algorithm))
+@pytest.mark.parametrize(("algorithm", "sampled"), [*((a, True) for a in Algorithm), (Algorithm.JACOBI, False)])
 def test_a_loop_is_solved_at_each_step_with_jacobi_from_what_the_others_had_before(algorithm: Algorithm, sampled: bool):
     rows: dict[float, tuple[float, ...]] = {}
     with Master(driven(sampled), MasterOptions(algorithm=algorithm)) as master:
@@ -175,7 +176,7 @@ def test_a_loop_that_cannot_be_solved_is_refused_and_spelled_out(algorithm: Algo
         wording.check(caught.value)
 
 
-@pytest.mark.parametrize("algorithm", [Algorithm.GAUSS_SEIDEL, Algorithm.FIXED_POINT, Algorithm.NEWTON])
+@pytest.mark.parametrize("algorithm", [Algorithm.GAUSS_SEIDEL, Algorithm.NEWTON])
 def test_a_loop_without_a_solution_fails_with_its_name(algorithm: Algorithm):
     system = cycle(native_fmu("gain"), (1.0, 2.0, 0.5))
     with (
@@ -244,7 +245,7 @@ def test_a_presumed_loop_around_a_declared_one_leaves_that_solved():
         assert float(master.signals["a.y"]) == pytest.approx(1.0 / 3.0, rel=1e-6)
 
 
-@pytest.mark.parametrize("algorithm", list(Algorithm))
+@pytest.mark.parametrize("algorithm", [Algorithm.JACOBI, Algorithm.NEWTON])
 def test_a_presumed_loop_that_is_none_starts_as_it_would_with_declared_dependencies(algorithm: Algorithm):
     found: list[list[float]] = []
     for dependencies in (True, False):
