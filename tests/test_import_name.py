@@ -35,9 +35,7 @@ def repository(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("call", "added"),
-    [(["script.py"], ""), (["-m", "script"], "."), (["-c", "import script"], "")],
-    ids=["script", "module with PYTHONPATH=.", "code"],
+    ("call", "added"), [(["script.py"], "."), (["-c", "import script"], "")], ids=["script", "code"]
 )
 def test_a_repository_with_folders_of_the_same_names_keeps_them(repository: Path, added: str, call: list[str]):
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, (added, os.environ.get("PYTHONPATH"))))}

@@ -34,8 +34,8 @@ FAULTS = {
     "returns_no_number": OUT("nan"),
 }
 CASES = [
-    *((name, path) for name in FAULTS for path in ("plan", "general path")),
-    *((list(FAULTS)[i % 4], path) for i, path in enumerate(OPTIONS) if i > 1),
+    *((name, "plan") for name in FAULTS),
+    *((list(FAULTS)[i % 4], path) for i, path in enumerate(OPTIONS) if i > 0),
     ("returns_early", "adaptive"),
     ("returns_before_in_events", "plan"),
     ("returns_beyond_in_events", "plan"),
@@ -63,7 +63,7 @@ def test_such_a_return_fails_the_run(name: str, path: str, tmp_path: Path):
         assert Record(tmp_path / "r.parquet").time.tolist() == [0.0, 0.1, 0.2]
 
 
-@pytest.mark.parametrize("path", OPTIONS)
+@pytest.mark.parametrize("path", ["plan", "general path", "events", "adaptive"])
 def test_a_return_at_the_end_but_for_rounding_is_none(path: str):
     s = System()
     s.add("unit", native_fmu("returns_nearly", 3))

@@ -3,7 +3,6 @@
 import ctypes
 import xml.etree.ElementTree as ET
 import zipfile
-from fractions import Fraction
 from pathlib import Path
 
 import fmpy
@@ -16,11 +15,7 @@ from support.wording import Wording
 
 from handover.cosim.blocks.variable import indices_of
 from handover.cosim.fmu.file.description import describe_fmu
-from handover.cosim.master.master import Master
-from handover.cosim.system.signals import Signals
 from handover.fmus.build import build_block, cached
-from handover.scenarios.free_flyer.parameters import ImpedanceParameters
-from handover.scenarios.free_flyer.push.impedance import FlyerImpedance
 
 BLOCK = "support.sample_units.every_kind:EveryKind"
 
@@ -120,20 +115,3 @@ def test_a_catalogued_unit_is_valid_and_gives_the_same_bits_in_both_forms():
 
 def element_names(name: str, shape: tuple[int, ...]) -> list[str]:
     return [f"{name}[{','.join(map(str, index))}]" for index in indices_of(shape)] if shape else [name]
-
-
-def test_our_own_master_runs_both_forms_together():
-    def poses(scalars: tuple[str, ...]) -> list[bytes]:
-        units, seen = FlyerImpedance.units, list[bytes]()
-
-        def observe(_t: float, y: Signals) -> None:
-            seen.append(np.concatenate([y["robot.p_WB"], y["robot.q_WB"]]).tobytes())
-
-        fmus = {unit: cached(block, 3, scalar=unit in scalars) for unit, block in units.items()}
-        with Master(FlyerImpedance().build(ImpedanceParameters(), 0, fmus.__getitem__)) as master:
-            master.run(Fraction(2, 125) * 15, [observe])
-        return seen
-
-    arrays = poses(())
-    assert poses(("robot", "push")) == arrays
-    assert len(set(arrays)) == 16

@@ -75,12 +75,6 @@ def expect_separate_process(done: "subprocess.CompletedProcess[str]") -> None:
     assert done.returncode == 0
 
 
-@pytest.mark.machine
-def test_by_the_note_of_the_environment_that_built_the_unit(unpacked: CtypesHost):
-    """The environment of another Python does no harm."""
-    expect_values(run(unpacked, PYTHONHOME="/nonexistent", PYTHONMALLOC="nonsense"))
-
-
 def test_by_the_environment_variable(unpacked: CtypesHost):
     note = note_of(unpacked)
     note.write_text(note.read_text().replace(f"library = {LIBRARY}", "library = "))
@@ -96,10 +90,6 @@ def test_by_the_interpreter_on_the_path(unpacked: CtypesHost, tmp_path: Path):
     expect_values(run(unpacked, PATH=f"{tmp_path}:/bin:/usr/bin"))
 
 
-def test_a_process_of_its_own_that_was_asked_for_needs_no_library(unpacked: CtypesHost):
-    expect_values(run(unpacked, FMU_LIBPYTHON="/no/libpython.so", FMU_PYTHON=sys.executable))
-
-
 @pytest.mark.machine
 def test_a_python_without_shared_library_runs_in_a_process_of_its_own_with_a_warning(unpacked: CtypesHost):
     note_of(unpacked).write_text(WITHOUT_LIBRARY)
@@ -112,12 +102,15 @@ def test_a_python_without_shared_library_runs_in_a_process_of_its_own_with_a_war
 @pytest.mark.machine
 @pytest.mark.parametrize("place", EITHER_PLACE)
 def test_a_folder_and_a_module_in_any_script_serve_in_any_locale(unpacked: CtypesHost, tmp_path: Path, place: str):
+    """Here by the note of the environment that built the unit, whatever there is of another Python's, or apart."""
     resources = shutil.copytree(unpacked.folder / "resources", tmp_path / "größe 100% #a" / "resources")
     with (resources / "sources" / "support" / "sample_units" / "every_kind.py").open("a", encoding="utf-8") as file:
         file.write("\nω = 3\n\nclass Ünit:\n    größe = ω\n")
-    bare: dict[str, Any] = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "FMU_PYTHON_PROCESS": place}
-    if place == "1":
-        bare["FMU_LIBPYTHON"] = "/no/libpython.so"
+    bare: dict[str, Any] = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    if place == "1":  # asked for by its interpreter, so that no library is needed
+        bare |= {"FMU_LIBPYTHON": "/no/libpython.so", "FMU_PYTHON": sys.executable}
+    else:
+        bare |= {"FMU_PYTHON_PROCESS": "0", "PYTHONHOME": "/nonexistent", "PYTHONMALLOC": "nonsense"}
     expect_values(run(unpacked, resources=resources, **bare))
 
 
