@@ -169,7 +169,7 @@ def test_commands_that_compile_for_all_platforms_or_film_have_options_that_there
         assert done.exit_code == 0, done.output
 
 
-@pytest.mark.slow
+@pytest.mark.platforms
 def test_a_unit_brings_its_interpreter(folder: Path):
     succeeded(command_with(" --standalone "), folder)
     (size,) = re.findall(r"`units/Push.fmi3-standalone.fmu`, (\d+) MB", TEXT)
@@ -250,8 +250,8 @@ def arguments_of(command: str) -> Sequence[str]:
 @pytest.mark.slow
 @pytest.mark.parametrize("command", [c for c in RUNS if not any(text in c for text in (*OF_FILES, " --out "))])
 def test_the_runs_succeed(command: str):
-    """Those of the Helix for half a second: whole ones are in tests/scenarios/helix."""
-    begins = ("--stop", "0.5") if " helix_" in command else ()
+    """Those of the Helix for a moment: whole ones are in tests/scenarios/helix."""
+    begins = ("--stop", "0.2") if " helix_" in command else ()
     summary = json.loads((kept_run(*arguments_of(command), *begins) / "summary.json").read_text())
     assert summary["complete"]
     assert summary["success"] is not bool(begins), summary["reason"]

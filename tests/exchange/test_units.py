@@ -1,7 +1,7 @@
-"""Every unit gives in a foreign host what it gives alone in our own master, and parameters and inputs act on it.
+"""A unit gives in a foreign host what it gives alone in our own master, and parameters and inputs act on it.
 
 Which unit runs where is a table: two in FMPy and in a program in C that has no Python in it at each change, in the slow
-tier the others in turn in one of them, and by `make hosts` all forms in all hosts, which makes docs/hosts.md.
+tier those with other kinds of ports and packages, and by `make hosts` all forms in all hosts (docs/hosts.md).
 """
 
 import os
@@ -23,12 +23,22 @@ from handover.fmus.catalog import UNITS
 HOST: Any = fmpy
 FMPY, C = ("FMPy", Form.FMI3), ("C program", Form.FMI2)
 QUICK = {"HandoverPartner": FMPY, "Thrusters": C}
+SLOW = {
+    "TendonArm": C,
+    "StereoCamera": C,
+    "HandoverVision": FMPY,
+    "VslArm": FMPY,
+    "HybridKinematics": C,
+    "ImpedanceController": FMPY,
+    "HandAndObject": FMPY,
+    "HandoverStateMachine": FMPY,
+    "HandoverTeam": C,
+    "GraspScene": FMPY,
+    "IrReflex": C,
+}
 TRIED = [
     *((unit, *where) for unit, where in QUICK.items()),
-    *(
-        pytest.param(unit, *(FMPY if i % 2 else C), marks=pytest.mark.slow)
-        for i, unit in enumerate(u for u in UNITS if u not in QUICK)
-    ),
+    *(pytest.param(unit, *where, marks=pytest.mark.slow) for unit, where in SLOW.items()),
 ]
 
 

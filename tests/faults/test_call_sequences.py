@@ -33,6 +33,7 @@ APART = {"FMU_PYTHON_PROCESS": "1"}
 KINDS = ("legal", "illegal")
 SAMPLES = ("every_kind:EveryKind", "sampled:Sampled", "tangent:Tangent", "bouncing_ball:BouncingBall")
 IN_DEFAULT = [(SAMPLES[0], 2), (SAMPLES[3], 3)]
+IN_SLOW = [(SAMPLES[0], 3), (SAMPLES[1], 3), (SAMPLES[2], 2), (SAMPLES[3], 2)]
 OTHERS = [(block, fmi) for block in SAMPLES for fmi in (2, 3) if (block, fmi) not in IN_DEFAULT]
 LIGHT = ("Push", "HybridKinematics")
 ONLY_FMI3 = ("StereoCamera", "HandoverVision")
@@ -146,8 +147,9 @@ def test_a_few_sequences_on_light_units(pool: WorkerPool, tmp_path: Path):
 
 @pytest.mark.slow
 def test_a_few_sequences_on_others_and_with_python_apart(pool: WorkerPool, tmp_path: Path):
-    pool.add([*sample_fmus(tmp_path, OTHERS), *catalog_fmus(LIGHT)], FEW)
-    pool.add(catalog_fmus(LIGHT[:1]), FEW, apart=True)
+    push, kinematics = (cached(name, fmi) for name, fmi in zip(LIGHT, (2, 3), strict=True))
+    pool.add([*sample_fmus(tmp_path, IN_SLOW), (push, 2), (kinematics, 3)], FEW)
+    pool.add([(push, 2)], FEW, apart=True)
     pool.run()
 
 

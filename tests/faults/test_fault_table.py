@@ -14,17 +14,19 @@ pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="wh
 def rows() -> list[Any]:
     """Return the rows with standard and way.
 
-    CI runs a unit in a process of its own, and in turn by the plan or on the general path, in one of the standards;
-    the rest is for fuzz.
+    CI runs a unit in a process of its own and by the plan or on the general path, in turn, or both ways where not the
+    same is right of them, and in one of the standards; the rest is for fuzz.
     """
     found: list[Any] = []
     for i, fault in enumerate(FAULTS):
         in_one_process = [way for way in fault.ways if way != "isolated"]
+        tried = ["isolated", in_one_process[i // 2 % len(in_one_process)]]
+        tried = tried if fault.differs else [tried[i % 2]]
         for k, way in enumerate(fault.ways):
             for fmi in fault.standards:
                 turn = fmi == fault.standards[(i + k) % len(fault.standards)]
-                in_ci = turn and way in ("isolated", in_one_process[i % len(in_one_process)])
-                tiers = () if turn and way in fault.fast else (pytest.mark.slow if in_ci else pytest.mark.fuzz,)
+                slow = pytest.mark.slow if turn and way in tried else pytest.mark.fuzz
+                tiers = () if turn and way in fault.fast else (slow,)
                 found.append(pytest.param(fault, fmi, way, marks=tiers, id=f"{fault.name}-{fmi}-{way}"))
     return found
 

@@ -1,4 +1,4 @@
-"""Every catalogued unit goes on from a restored state as if it had never stopped, bit for bit, wherever that is."""
+"""A catalogued unit goes on from a restored state as if it had never stopped, bit for bit, wherever that is."""
 
 from collections.abc import Iterator
 from multiprocessing.pool import Pool
@@ -18,11 +18,18 @@ LIMIT = 120.0
 IN_BOTH = ("FreeFlyer", "HandoverStateMachine")
 """Units whose FMI 2 form is tried too; what differs between the forms is not the unit's."""
 
-OF_EACH_KIND = ("HandAndObject", "Push", "VslArm")
+OF_EACH_KIND = ("Push", "VslArm")
 """Units in the fast tier."""
 
+IN_CI = (
+    "TendonArm", "TendonArmFast", "StereoCamera", "HandoverVision", "LargeObjectAndHands", "HandAndObject",
+    "GraspScene", "IrReflex",
+)  # fmt: skip
+"""Units in the slow tier: with pictures, solvers of others, or much of a state; of the rest the blocks are tested."""
+
 FORMS = [(n, 2) for n in IN_BOTH] + [
-    pytest.param(n, 3, marks=[] if n in OF_EACH_KIND else [pytest.mark.slow]) for n in UNITS
+    pytest.param(n, 3, marks=[] if n in OF_EACH_KIND else [pytest.mark.slow if n in IN_CI else pytest.mark.fuzz])
+    for n in UNITS
 ]
 
 

@@ -1,12 +1,16 @@
 """Properties of a shared library, read with lief: alike for ELF, PE and Mach-O."""
 
 import hashlib
+import re
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import lief
+
+from handover.fmus.compile import cache_folder
 
 lief.logging.disable()
 
@@ -81,6 +85,13 @@ def slices(content: bytes) -> Iterator[bytes]:
         assert alignment == 14
         assert offset % 2**alignment == 0
         yield content[offset : offset + size]
+
+
+def expect_no_folder(content: bytes, sources: Path) -> None:
+    """Fail where a library tells of a folder of the machine that compiled it."""
+    folders = {str(p).encode() for p in (Path(__file__).parents[3], sources, Path.home(), cache_folder())}
+    assert [folder for folder in folders if folder in content] == []
+    assert not re.search(rb"compiling-|[\w/]{3,}\.[ch]\0|\.pdb\0", content)
 
 
 def is_signed(content: bytes) -> bool:
