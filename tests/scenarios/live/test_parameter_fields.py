@@ -4,12 +4,11 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
+from support.commands import call
 from support.cosim.native_units import native_fmu
 
 from handover.cosim.blocks.variable import Causality, Declared, Kind
 from handover.cosim.python_process import code_command
-from handover.scenarios.cli.command import main
 from handover.scenarios.execution.request import RunRequest
 from handover.scenarios.live.parameter_fields import faults_by_name, field_groups, field_of, without_call
 from handover.scenarios.live.play_page import Session
@@ -38,7 +37,7 @@ def test_a_scenarios_fields_are_its_parameters_without_that_of_an_algorithm_and_
     assert "parallel_step" not in fields_of("flyer_impedance")
     assert "parallel_step" in fields_of("flyer_impedance", "parallel_step=0.004")
     file = str(tmp_path / "x.ssp")
-    done = CliRunner().invoke(main, ["export", "flyer_impedance", "--ssp", file])
+    done = call("export", "flyer_impedance", "--ssp", file)
     assert done.exit_code == 0, done.output
     assert {"push.force", "thrusters.flapper_range"} <= {*fields_of(file)}
 
@@ -54,9 +53,8 @@ def test_a_session_of_an_fmu_has_fields_of_its_inputs_and_gives_a_file_of_them_t
     monkeypatch.setattr("handover.scenarios.cli.play._serve", serve)
     file = tmp_path / "f.csv"
     file.write_text("time,f\n0,0\n1,2\n", encoding="utf-8")
-    arguments = ["play", str(native_fmu("mass", 2)), "-p", "k=2", "--input", str(file), "--start", "-1"]
-    arguments += ["--out", str(tmp_path / "p")]
-    result = CliRunner().invoke(main, arguments)
+    arguments = (native_fmu("mass", 2), "-p", "k=2", "--input", file, "--start", "-1", "--out", tmp_path / "p")
+    result = call("play", *arguments)
     assert result.exit_code == 0, result.output
     [session] = sessions
     assert {"m", "k", "f"} <= {*session.names}

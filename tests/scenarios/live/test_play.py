@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 import psutil
 import pytest
-from click.testing import CliRunner
 from playwright.sync_api import Browser, Page
-from support.commands import Command, run_command
+from support.commands import Command, refusal, run_command
 from support.kept_runs import kept_run
 from support.live_pages import LIVE, connected, frame, frames_come, page_command, send, shown, time_passes, told
 from support.opened_page import overflow, wait_until
@@ -21,7 +20,6 @@ from support.served_live_page import answered
 from support.wording import Wording
 
 from handover.cosim.record.reader import Record
-from handover.scenarios.cli.command import main
 
 
 @contextmanager
@@ -166,9 +164,7 @@ def test_a_session_that_cannot_begin_is_refused(
     given: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wording: Wording
 ):
     monkeypatch.chdir(tmp_path)
-    done = CliRunner().invoke(main, ["play", *given])
-    assert done.exit_code == 2
-    wording.check(done.output)
+    wording.check(refusal("play", *given))
     assert list(tmp_path.iterdir()) == []
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from support.commands import refusal
 from support.scenarios.flyer_runs import task_of
 from support.wording import Wording
 
@@ -16,7 +16,6 @@ from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.cosim.system.time_series import TimeSeries
 from handover.scenarios.catalog import SCENARIOS
-from handover.scenarios.cli.command import main
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.runner import run_task
 from handover.scenarios.results.task import InputSources
@@ -42,7 +41,7 @@ def pushed_run(name: str, out: Path, forces: Mapping[str, Sequence[float] | Floa
     [
         pytest.param("flyer_two_robots", (), "robot_2", marks=pytest.mark.slow),
         pytest.param("flyer_arm_impedance", ("begin=30",), "robot", marks=pytest.mark.slow),
-        ("helix_reach", (), "arm"),
+        pytest.param("helix_reach", (), "arm", marks=pytest.mark.slow),
     ],
 )
 def test_each_of_its_bodies_yields_to_a_push_and_the_scene_shows_it(
@@ -83,7 +82,5 @@ def test_each_of_its_bodies_yields_to_a_push_and_the_scene_shows_it(
     ],
 )
 def test_pushes_that_cannot_be_are_refused_before_anything_runs(given: Sequence[str], tmp_path: Path, wording: Wording):
-    done = CliRunner().invoke(main, ["run", *given, "--push", "--out", str(tmp_path / "run")])
-    assert done.exit_code == 2
-    wording.check(done.output)
+    wording.check(refusal("run", *given, "--push", "--out", tmp_path / "run"))
     assert not (tmp_path / "run").exists()

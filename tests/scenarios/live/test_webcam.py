@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from support.commands import refusal
 from support.live_pages import LIVE, live_run, shown
 from support.opened_page import launched, wait_until
 from support.served_live_page import answered, served
@@ -18,7 +18,6 @@ from support.webcam_files import camera_of, write_files, write_video
 from support.wording import Wording
 
 from handover.cosim.record.reader import Record
-from handover.scenarios.cli.command import main
 from handover.scenarios.live.live_page import LivePage
 from handover.scenarios.live.webcam import (
     BUNDLE,
@@ -84,9 +83,7 @@ def test_a_run_is_refused_a_webcam_before_anything_runs(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "empty").mkdir()
     write_files(tmp_path / "vision")
-    done = CliRunner().invoke(main, ["run", SCENARIO, "--out", "run", *given])
-    assert done.exit_code == 2
-    wording.check(done.output)
+    wording.check(refusal("run", SCENARIO, "--out", "run", *given))
     assert not (tmp_path / "run").exists()
 
 

@@ -5,11 +5,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
+from support.commands import call
 from support.scenarios.tutorial import succeeded
 from support.wording import Wording
-
-from handover.scenarios.cli.command import main
 
 
 def files_in(folder: Path) -> set[str]:
@@ -38,7 +36,7 @@ def test_a_unit_and_a_controller_are_written_and_listed(tmp_path: Path):
 
 def test_a_module_that_python_has_is_not_hidden(tmp_path: Path, wording: Wording):
     for name in ("Random", "Handover", "numpy"):
-        done = CliRunner().invoke(main, ["new", "unit", name, "--out", str(tmp_path)])
+        done = call("new", "unit", name, "--out", tmp_path)
         assert done.exit_code == 2
         wording.check(done.stderr)
     assert not list(tmp_path.iterdir())
@@ -50,6 +48,6 @@ def test_how_to_run_its_test_is_told_also_without_pytest(there: bool, tmp_path: 
         return there if name == "pytest" else None
 
     monkeypatch.setattr("handover.scenarios.cli.units.new.find_spec", find_spec)
-    told = CliRunner().invoke(main, ["new", "controller", "Quick", "--out", str(tmp_path)]).stderr
+    told = call("new", "controller", "Quick", "--out", tmp_path).stderr
     assert ("its test: python -m pytest test_quick.py" in told) is there
     assert ("its test: python -m pip install pytest, then python -m pytest test_quick.py" in told) is not there

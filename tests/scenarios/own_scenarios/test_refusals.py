@@ -5,12 +5,10 @@ from collections.abc import Generator
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
+from support.commands import call
 from support.scenarios.own_controllers import write_placed
 from support.scenarios.tutorial import SCENE, refused, write_files
 from support.wording import Wording
-
-from handover.scenarios.cli.command import main
 
 LACKING = """
 from reach import TwoLinkReach
@@ -95,7 +93,7 @@ def test_what_is_wrong_is_told_in_one_line_and_nothing_is_written(
     monkeypatch.chdir(prepared)
     monkeypatch.setattr(sys, "path", [*sys.path])
     before = {*prepared.rglob("*.*")}
-    done = CliRunner().invoke(main, arguments)
+    done = call(*arguments)
     assert done.exit_code == 2, done.output
     assert {path for path in prepared.rglob("*.*") if path.suffix != ".pyc"} <= before
     (line,) = [line for line in done.stderr.strip().splitlines() if not line.endswith(" ...")]
@@ -108,7 +106,7 @@ def test_a_unit_that_does_not_fit_is_told_before_a_sweep_begins(
     monkeypatch.chdir(prepared)
     monkeypatch.setattr(sys, "path", [*sys.path])
     units = "controller=goal_spring:SpringToGoal,arm:TwoLinkArm"
-    done = CliRunner().invoke(main, ["sweep", SCENE, "--unit", units, "--out", "other"])
+    done = call("sweep", SCENE, "--unit", units, "--out", "other")
     assert done.exit_code == 2
     wording.check(done.stderr)
     assert not (prepared / "other").exists()

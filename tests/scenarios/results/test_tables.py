@@ -6,14 +6,13 @@ from fractions import Fraction
 from html import unescape
 from pathlib import Path
 
-from click.testing import CliRunner
+from support.commands import call
 from support.failing_systems import failing_ssp, native_fmu
 from support.faults.faulty_units import faulty_fmu
 
 import handover
 from handover.cosim.ssp.writing import write_ssp
 from handover.cosim.system.system import System
-from handover.scenarios.cli.command import main
 from handover.scenarios.reporting.run_page import write_run_page
 from handover.scenarios.results.folder_data import Summary
 from handover.scenarios.results.run_folder import RunFolder
@@ -37,7 +36,7 @@ def text_of(html: str) -> str:
 
 
 def run(file: Path, out: Path, *arguments: str) -> str:
-    done = CliRunner().invoke(main, ["run", str(file), "--out", str(out), *arguments])
+    done = call("run", file, "--out", out, *arguments)
     assert done.exit_code == 0, done.output
     return done.output
 

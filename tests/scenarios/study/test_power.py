@@ -4,11 +4,10 @@ import json
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 from scipy import stats
+from support.commands import call
 from support.wording import Wording
 
-from handover.scenarios.cli.command import main
 from handover.scenarios.study.plan.plan import default_plan, parse_plan
 from handover.scenarios.study.statistics.power import PowerAssumptions, fewest_participants, simulated_power
 
@@ -28,8 +27,7 @@ def test_the_t_test_agrees_with_the_noncentral_distribution(people: int, exact: 
 @pytest.mark.parametrize(("people", "status"), [("8,12", 0), ("ten", 2), ("1", 2)])
 def test_the_command_says_what_was_assumed_or_is_wrong(people: str, status: int, tmp_path: Path, wording: Wording):
     (tmp_path / "plan.toml").write_text(default_plan(), encoding="utf-8")
-    arguments = ["study", "power", str(tmp_path / "plan.toml"), "--participants", people, "--repeat", "100"]
-    shown = CliRunner().invoke(main, arguments)
+    shown = call("study", "power", tmp_path / "plan.toml", "--participants", people, "--repeat", "100")
     assert shown.exit_code == status, shown.output
     wording.check(shown.output)
 
@@ -60,8 +58,8 @@ def test_too_few_find_nothing_after_holm():
 
 def test_what_all_studies_find_is_100_percent_with_its_interval(tmp_path: Path):
     (tmp_path / "plan.toml").write_text(default_plan(), encoding="utf-8")
-    arguments = ["study", "power", str(tmp_path / "plan.toml"), "--participants", "12", "--repeat", "100"]
-    data = json.loads(CliRunner().invoke(main, [*arguments, "--effect", "9", "--json"]).output)["power"][0]
+    arguments = ("--participants", "12", "--repeat", "100", "--effect", "9", "--json")
+    data = json.loads(call("study", "power", tmp_path / "plan.toml", *arguments).output)["power"][0]
     found, error = data["single_uncorrected"], data["familywise_error"]
     assert (found["estimate"], found["successes"], found["repeats"], found["high"]) == (1.0, 100, 100, 1.0)
     assert found["low"] == pytest.approx(0.0250 ** (1 / 100), abs=1e-6)

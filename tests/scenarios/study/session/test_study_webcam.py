@@ -8,7 +8,7 @@ from urllib.request import urlopen
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from support.commands import call, refusal
 from support.opened_page import launched, wait_until
 from support.scenarios import study_server
 from support.scenarios.served_page import at, pilot_plan, served, to_round
@@ -17,7 +17,6 @@ from support.webcam_files import camera_of, write_files, write_video
 from support.wording import Wording
 
 from handover.cosim.record.reader import Record
-from handover.scenarios.cli.command import main
 from handover.scenarios.live.webcam import FILES, MODEL, WebcamFiles
 from handover.scenarios.reporting.page import asset
 from handover.scenarios.study.folder.study_folder import StudyFolder
@@ -107,9 +106,7 @@ def test_a_webcam_without_files_or_plan_is_refused_before_anything_starts(tmp_pa
     mice.write_text(default_plan(), encoding="utf-8")
     (tmp_path / "empty").mkdir()
     for given in ((plan,), (plan, "--webcam", tmp_path / "empty"), (mice, "--webcam", folder)):
-        done = CliRunner().invoke(main, ["study", "serve", *map(str, given), "--out", str(out)])
-        assert done.exit_code == 2
-        wording.check(done.output)
+        wording.check(refusal("study", "serve", *given, "--out", out))
     assert not out.exists()
-    shown = CliRunner().invoke(main, ["study", "plan", str(plan)])
+    shown = call("study", "plan", plan)
     assert "webcam, hand followed by a webcam (offered by `study serve --webcam FOLDER`)" in shown.output
