@@ -1,9 +1,6 @@
 """A scenario as an environment: Gymnasium's own check, the declared spaces, and the trajectories of the unit itself."""
 
-import subprocess
-import sys
 from fractions import Fraction
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -54,11 +51,12 @@ def driven(env: ScenarioEnvironment, run: handover.Run, steps: int = 100_000) ->
     """Act as the unit did in a run, for so many steps or to its end; return the rewards and the last information."""
     observed, info = env.reset(seed=3)
     rewards: list[float] = []
-    signals = run.signals
-    for k in range(len(signals.time)):
-        for name in ("p_WH", "yaw", "sigma", "ticks"):
-            assert np.array_equal(observed[name], signals[f"scene.{name}"][k]), (name, k)
-        action = {name: signals[f"reflex.{name}"][k] for name in (*COMMANDS, "phase")}
+    seen = {name: run.signals[f"scene.{name}"] for name in ("p_WH", "yaw", "sigma", "ticks")}
+    done = {name: run.signals[f"reflex.{name}"] for name in (*COMMANDS, "phase")}
+    for k in range(len(run.signals.time)):
+        for name, values in seen.items():
+            assert np.array_equal(observed[name], values[k]), (name, k)
+        action = {name: values[k] for name, values in done.items()}
         observed, reward, terminated, truncated, info = env.step(action)
         rewards.append(reward)
         assert not truncated
@@ -83,8 +81,8 @@ def test_who_acts_as_the_unit_does_moves_the_world_as_it_did_and_a_reward_of_one
         reward=lambda s: -float(np.linalg.norm(s["scene.p_WO"] - s["scene.p_WH"])),
         strategy="blind",
     )
-    rewards, _ = driven(env, run, steps=100)
-    assert rewards == pytest.approx(-away[1:101])
+    rewards, _ = driven(env, run, steps=30)
+    assert rewards == pytest.approx(-away[1:31])
     env.close()
 
 
@@ -128,21 +126,10 @@ def test_a_bad_action_is_refused(wording: Wording):
     env.close()
 
 
-def test_without_gymnasium_one_line_says_what_to_install(tmp_path: Path):
-    program = (
-        "import inspect, sys; sys.modules['gymnasium'] = None; import handover; inspect.getmembers(handover);"
-        " handover.environment('ir_grasp', place='reflex')"
-    )
-    done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.stderr.splitlines()[-1] == (
-        "ImportError: handover.environment needs gymnasium: python -m pip install 'handover-cosim[gym]'"
-    )
-
-
 def test_what_nobody_gives_is_no_metric():
     poles = ("pole_radius", "damping_ratio", "pole_frequency")
     with handover.open("flyer_impedance", place="impedance") as session:
-        session.step(0.1)
+        session.step(0.02)
         assert not [name for name in session.outcome.metrics if name.endswith("_impedance")]
     with handover.open("flyer_impedance", place="impedance") as session:
         for name, value in zip(poles, (0.99, 0.7, 0.4), strict=True):

@@ -86,7 +86,9 @@ def test_the_base_installation_builds_checks_and_runs_units(base: Path, tmp_path
 
 
 IN_PYTHON = """
+import inspect
 import handover
+inspect.getmembers(handover)
 system = handover.System()
 system.add("one", handover.unit("Push"))
 run = handover.run(system, stop=0.1, out="one")
@@ -140,6 +142,7 @@ LACKING = (
 )
 
 
+@pytest.mark.slow
 def test_what_needs_an_extra_names_it_in_one_line_and_writes_nothing(base: Path, tmp_path: Path):
     done = handover(base, tmp_path, [call for call, *_ in LACKING])
     for (status, output), (call, extra, names) in zip(done, LACKING, strict=True):

@@ -14,6 +14,7 @@ from handover.cosim.record.reader import Record
 FILES = ["run.json", "signals.csv", "summary.json", "report.html"]
 
 
+@pytest.mark.usefixtures("empty_figures")
 @pytest.mark.parametrize("full", FILES)
 def test_a_full_disk_is_reported_and_the_record_is_kept(full: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     replace = os.replace

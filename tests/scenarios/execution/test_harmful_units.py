@@ -28,9 +28,8 @@ TOGETHER = (
 GENERAL = ("--algorithm", "fixed-point")
 
 
-def end_of_chain(folder: Path, units: Sequence[str], *options: str) -> list[float]:
+def end_of_chain(folder: Path, units: Sequence[str], *options: str, page: bool = False) -> list[float]:
     """Return what is read of units in a chain by a run that ends as if there were no harm in them."""
-    page = "round_up_in_load" in units
     more = () if page else ("--no-report",)
     status, shown, errors = start(folder, failing_chain(folder, units), "--out", "r", *options, *more).wait()
     assert (status, errors) == (0, "drawing figures, writing the report ...\n" if page else ""), shown
@@ -70,6 +69,10 @@ def test_so_it_does_where_they_do_it_before_it_begins(
 ):
     x = end_of_chain(tmp_path, [f"{harm}_in_{when}" for harm in TOGETHER])
     assert x == without_harm(len(TOGETHER))
+
+
+def test_figures_and_page_are_drawn_where_a_unit_rounds_up(tmp_path: Path):
+    end_of_chain(tmp_path, ["round_up_in_load"], page=True)
 
 
 @slow

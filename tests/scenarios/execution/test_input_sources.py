@@ -74,7 +74,7 @@ def led_by_script(wanted: Path, out: Path) -> None:
     inputs = SharedInputs.create(out.with_suffix(".inputs"), sizes, ["person.age"])
     script = Scripted(inputs, Record(wanted / "signals.parquet"))
     inputs = InputSources(script.sources(), {"from": "program", "what": "a script"})
-    task = replace(task_of(RobotToHuman, out, "hand=outside"), inputs=inputs, stop=Fraction(1))
+    task = replace(task_of(RobotToHuman, out, "hand=outside"), inputs=inputs, stop=Fraction(1, 2))
     run_task(task, tell_nobody, Interruption())
 
 
@@ -85,7 +85,7 @@ def test_a_run_led_by_shared_inputs_is_played_back_byte_for_byte(tmp_path: Path)
     led = Record(tmp_path / "led" / "signals.parquet")
     assert led["person.age"].max() < 0.2
     assert np.ptp(led["person.p_WH_track"], axis=0).max() > 0.001
-    again: dict[str, Any] = {"hand": "outside", "inputs_from": tmp_path / "led", "stop": 1, "progress": False}
+    again: dict[str, Any] = {"hand": "outside", "inputs_from": tmp_path / "led", "stop": 0.5, "progress": False}
     handover.run("flyer_robot_to_human", out=tmp_path / "again", **again)
     a, b = ((tmp_path / name / "signals.parquet").read_bytes() for name in ("led", "again"))
     assert a == b
@@ -128,9 +128,10 @@ def test_a_run_that_lacks_inputs_is_refused_before_anything_is_written(tmp_path:
 
 
 def test_a_run_that_goes_on_after_its_recorded_inputs_says_when_they_end(tmp_path: Path):
-    given = ("run", "flyer_robot_to_human", "-p", "hand=outside", "--no-report", "--stop")
-    assert call(*given, "0.08", "--out", tmp_path / "led").exit_code == 1
-    output = call(*given, "0.16", "--inputs-from", tmp_path / "led", "--out", tmp_path / "again").output
+    task = task_of(FlyerImpedance, tmp_path / "pushed")
+    run_task(replace(task, stop=Fraction(2, 25), pushed=True), tell_nobody, Interruption())
+    given = ("run", "flyer_impedance", "--push", "--inputs-from", tmp_path / "pushed", "--no-report")
+    output = call(*given, "--stop", "0.16", "--out", tmp_path / "again").output
     assert "the recorded inputs end at 0.08 s, and the run went on until 0.16 s" in output
 
 

@@ -71,7 +71,7 @@ def test_a_terminal_that_is_closed_ends_a_run_unless_that_is_ignored(handler: si
 
 def test_ctrl_c_while_units_are_built_leaves_nothing(tmp_path: Path):
     cache, out = tmp_path / "cache", tmp_path / "r"
-    going = Command("run", "helix_handover", "--out", out, env={"HANDOVER_CACHE": str(cache)})
+    going = Command("run", "ir_grasp", "--out", out, env={"HANDOVER_CACHE": str(cache)})
     wait_until(cache.exists, going)
     going.send_signal(signal.SIGINT)
     status, _, errors = going.wait()

@@ -40,7 +40,7 @@ def test_a_run_that_cannot_go_on_has_its_record_and_names_the_limit(tmp_path: Pa
     assert not (out / "signals.arrows").exists()
 
 
-@pytest.mark.parametrize(("limit", "when"), [("memory", "load"), ("files", "instantiate"), ("descriptors", "load")])
+@pytest.mark.parametrize(("limit", "when"), [("files", "instantiate"), ("descriptors", "load")])
 def test_one_that_does_so_before_the_run_has_begun_leaves_no_folder(tmp_path: Path, limit: str, when: str):
     unit = f"lower_{limit}_in_{when}"
     done = run(unit, tmp_path)

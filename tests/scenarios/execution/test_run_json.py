@@ -1,13 +1,11 @@
 """A run's folder has its title, parameters, units and connections, so that a page can be made of it later."""
 
-from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
 
 import pytest
-from support.commands import call, data_in
+from support.commands import data_in
 from support.cosim.native_units import native_fmu
-from support.failing_systems import failing_ssp
 from support.kept_runs import kept_run
 
 from handover.cosim.system.system import System
@@ -45,17 +43,6 @@ def test_a_scenario_says_how_it_is_presented_and_wired():
     assert (scene["name"], scene["model"], scene["step"]) == ("scene", "GraspScene (FMI 3)", "15 ms")
     assert reflex["steps"] == pytest.approx(summary["simulated_seconds"] / 0.015, abs=1)
     assert 0.0 < reflex["cpu_seconds"] < scene["cpu_seconds"] < summary["cpu_seconds"]
-
-
-def test_an_ssp_says_the_same_and_a_unit_without_period_has_none(tmp_path: Path):
-    file, out = failing_ssp(tmp_path, "gain"), tmp_path / "out"
-    done = call("run", file, "--out", out, "--adaptive", "1e-3", "--no-report")
-    assert done.exit_code == 0, done.output
-    found = data_in(out, "run")
-    assert found["told_parameters"] == []
-    assert file.name in found["title"]
-    assert {unit["period"] for unit in found["system"]["units"]} == {None}
-    assert [u["name"] for u in data_in(out)["units"]] == [u["name"] for u in found["system"]["units"]]
 
 
 def test_units_are_reported_as_their_sources_have_them_and_pictures_as_binary():

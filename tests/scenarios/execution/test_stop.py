@@ -1,4 +1,4 @@
-"""`--stop` of a scenario: a run ends there, is judged as one that was ended, and is resumed to the same time."""
+"""`--stop` of a scenario: a run ends there, and is judged as one that was ended."""
 
 from dataclasses import replace
 from fractions import Fraction
@@ -8,7 +8,6 @@ import pytest
 from support.campaigns import carried_out, short_plan
 from support.commands import call, data_in
 from support.kept_runs import kept_run
-from support.killed_run import killed_run
 
 import handover
 from handover.cosim.record.reader import Record
@@ -53,15 +52,6 @@ def test_what_ended_by_itself_was_not_asked_to(tmp_path: Path, monkeypatch: pyte
     assert "not judged: the verdict failed: KeyError" in done.output
     assert "as asked" not in done.output
     assert Record(tmp_path / "r" / "signals.parquet").time[-1] == own_end
-
-
-def test_an_interrupted_run_is_resumed_to_it(tmp_path: Path):
-    arguments = ("run", "ir_grasp", "--stop", "1.5", "--no-report")
-    whole = kept_run(*arguments)
-    killed = killed_run(tmp_path / "r", 0.8, *arguments, "--checkpoint", "0.5")
-    assert call("resume", killed, "--no-report").exit_code == 1
-    assert (killed / "signals.parquet").read_bytes() == (whole / "signals.parquet").read_bytes()
-    assert data_in(killed)["reason"] == data_in(whole)["reason"]
 
 
 def test_of_a_campaign_it_ends_all_runs_and_is_a_part_of_its_identity(tmp_path: Path):

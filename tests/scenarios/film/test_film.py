@@ -65,12 +65,12 @@ def cursor(picture: Pixels) -> float:
 
 def test_a_films_scene_and_cursor_move_with_the_times_of_its_frames(grasp: Path, tmp_path: Path):
     out, plot = tmp_path / "grasp.mp4", "cost of thumb and ring, [Luberto] eq. (4)"
-    status, told = film(grasp, "--out", out, "--size", f"{WIDE}x{HIGH}", "--pace", 5, "--fps", 4, "--plot", plot)
+    status, told = film(grasp, "--out", out, "--size", f"{WIDE}x{HIGH}", "--pace", 10, "--fps", 4, "--plot", plot)
     assert status == 0, told
     assert f"\nfilm: {out}, " in told
     assert [p.name for p in tmp_path.iterdir()] == ["grasp.mp4"]
     time, shown = Record(grasp / "signals.parquet").time, frames(out)
-    assert len(shown) == int((time[-1] - time[0]) / 5 * 4) + 2  # the first, each 1.25 s after it, and the last
+    assert len(shown) == int((time[-1] - time[0]) / 10 * 4) + 2  # the first, each 2.5 s after it, and the last
     assert {p.shape for p in shown} == {(HIGH, WIDE)}
     assert cv2.VideoCapture(str(out)).get(cv2.CAP_PROP_FPS) == pytest.approx(4.0)
     scene = [p[60:300, 20:350].astype(float) for p in shown]

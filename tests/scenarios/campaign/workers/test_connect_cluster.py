@@ -2,7 +2,6 @@
 
 import os
 import pickle
-import signal
 import subprocess
 import sys
 from collections.abc import Generator
@@ -10,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from support.clusters import scheduler, worker
-from support.processes import lives, parent, program, servers, until
+from support.processes import lives, program, servers, until
 from support.scenarios.sample_jobs import bad_job, quick_job
 
 from handover.scenarios.campaign.local_cluster import connect_cluster
@@ -109,15 +108,3 @@ def test_a_worker_that_does_not_see_the_folder_is_refused(
         ):
             pool.check(Path("/proc/self/cwd"))  # another folder in each process
         assert list((tmp_path / "here").iterdir()) == []
-
-
-def test_workers_that_are_killed_are_replaced(address: str, nanny: int, tmp_path: Path):
-    runs = tmp_path / "runs"
-    with connect_cluster(address) as pool:
-        names: list[str] = []
-        for result in pool.run_jobs([quick_job(runs, f"run_{i}", seed=i) for i in range(4)]):
-            if not names:
-                os.kill(parent(servers(nanny)[0]), signal.SIGKILL)
-            assert result.lost == ""
-            names.append(result.name)
-    assert sorted(names) == [f"run_{i}" for i in range(4)]

@@ -9,6 +9,7 @@ import time
 import zipfile
 from collections.abc import Generator
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -58,9 +59,9 @@ def test_the_signals_are_those_of_the_same_run_by_itself_also_if_it_is_executed_
     server: ServerProcess, tmp_path: Path
 ):
     alone, runs = tmp_path / "alone", tmp_path / "runs"
-    call("run", "ir_grasp", "--seed", "3", "--no-report", "--out", alone)
+    call("run", "ir_grasp", "--seed", "3", "--stop", "0.5", "--no-report", "--out", alone)
     for _ in range(2):
-        assert server.run_job(job(runs), yes).lost == ""
+        assert server.run_job(replace(job(runs), stop=Fraction(1, 2)), yes).lost == ""
     assert [p.name for p in runs.iterdir()] == ["run"]
     assert (runs / "run" / "signals.parquet").read_bytes() == (alone / "signals.parquet").read_bytes()
     assert {p.name for p in (runs / "run").iterdir()} == {"run.json", "signals.parquet", "summary.json"}
