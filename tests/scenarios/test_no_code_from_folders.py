@@ -145,16 +145,15 @@ def read_campaigns(folder: Path, out: Path, source: dict[str, Any]) -> None:
     assert loaded.points  # type: ignore
 
 
-@pytest.mark.parametrize(("read", "number"), [(read_runs, 0), (read_runs, 1), (read_campaigns, 0)])
+@pytest.mark.parametrize("read", [read_runs, read_campaigns])
 def test_what_reads_a_folder_imports_nothing_that_it_names(
-    read: Callable[[Path, Path, dict[str, Any]], None], number: int, marker: Path, tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-):  # fmt: skip
+    read: Callable[[Path, Path, dict[str, Any]], None], marker: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
     theirs = tmp_path / "theirs"
     plant(theirs, marker)
     monkeypatch.chdir(theirs)  # nor from the working directory
     path = [*sys.path]
-    read(theirs, tmp_path, sources(theirs)[number])
+    read(theirs, tmp_path, sources(theirs)[0])
     assert not marker.exists()
     assert sys.path == path
 

@@ -19,21 +19,17 @@ from handover.scenarios.experiment.plotting import draw_time_figures, draw_time_
 from handover.scenarios.experiment.time_plot import COLOURS, Curve, TimePlot
 from handover.scenarios.reporting.time_plots import time_figure
 
-SHORT = {
-    "ir_grasp": (),
-    "flyer_impedance": (),
-    "vsl_hybrid": ("points=5", "settle=1", "speed=0.2"),
-}
+SCENES = ("ir_grasp", "flyer_impedance", "vsl_hybrid")
 
 
 class Run:
     """A run, with what it was asked for and what it left."""
 
-    def __init__(self, name: str, given: tuple[str, ...]) -> None:
+    def __init__(self, name: str) -> None:
         scenario: type[Experiment[Any]] = SCENARIOS[name]
-        folder = kept_run("run", name, *(text for value in given for text in ("-p", value)), "--no-report")
+        folder = kept_run("run", name, "--no-report")
         self.metrics = json.loads((folder / "summary.json").read_text())["metrics"]
-        self.experiment, self.parameters = scenario(), parse_parameters(scenario, given)
+        self.experiment, self.parameters = scenario(), parse_parameters(scenario, [])
         self.file = folder / "signals.parquet"
         self.record = Record(self.file)
         self.plots = {p.title: p for p in self.experiment.plots(self.parameters, self.record)}
@@ -49,7 +45,7 @@ class Runs(dict[str, Run]):
     """Runs by scenario, made when they are asked for."""
 
     def __missing__(self, name: str) -> Run:
-        self[name] = Run(name, SHORT[name])
+        self[name] = Run(name)
         return self[name]
 
 
@@ -58,7 +54,7 @@ def runs() -> Runs:
     return Runs()
 
 
-@pytest.mark.parametrize("name", SHORT)
+@pytest.mark.parametrize("name", SCENES)
 def test_curves_are_as_long_as_the_record_and_phases_are_named(name: str, runs: Runs):
     done = runs[name]
     assert 3 <= len(done.plots) <= 15

@@ -20,8 +20,8 @@ from handover.scenarios.results.run_folder import RunFolder
 RUNS = (
     ("ir_grasp", (), 3),
     ("flyer_impedance", (), 2),
-    pytest.param("flyer_robot_to_human", ("behaviour=compliant",), 3, marks=pytest.mark.slow),
-    pytest.param("flyer_human_to_robot", (), 1, marks=pytest.mark.slow),
+    pytest.param("flyer_robot_to_human", (), 3, marks=pytest.mark.slow),
+    pytest.param("flyer_human_to_robot", ("behaviour=compliant",), 1, marks=pytest.mark.slow),
 )
 
 

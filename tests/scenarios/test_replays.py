@@ -29,13 +29,15 @@ MUST_SHOW: dict[str, set[str]] = {
     "ir_sensor": {"palm", "thumb", "index", "ring", "object", "beams"},
 }
 FIRST = ("vsl_hybrid", "flyer_impedance")
+BRIEF = ("helix_handover", "helix_reflex_grasp", "helix_reach", "vsl_model_based", "flyer_handover")
+"""Scenarios of which no other test has a whole run by its own parameters."""
 LARGEST = 400_000
 
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=() if n in FIRST else (pytest.mark.slow,)) for n in SCENARIOS])
 def test_a_scenario_is_shown_in_space(name: str):
-    begins = ("--stop", "1") if name.startswith(("helix_", "vsl_")) and name not in (*FIRST, "helix_use_case") else ()
-    record = Record(kept_run("run", name, *begins, "--no-report") / "signals.parquet")
+    begins = ("--stop", "0.5") if name in BRIEF else ()
+    record = Record(kept_run("run", name, "--no-report", *begins) / "signals.parquet")
     scenario, parameters = SCENARIOS[name](), parse_parameters(SCENARIOS[name], ())
     replay = scenario.replay(parameters, record)
     assert replay is not None

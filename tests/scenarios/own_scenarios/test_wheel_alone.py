@@ -118,11 +118,11 @@ def test_a_run_has_its_record_and_a_page_with_a_replay_and_so_has_its_ssp(own: I
         np.testing.assert_array_equal(theirs[name][: len(ours.time)], ours[name])
 
 
-def test_campaigns_are_carried_out_and_compared(own: Installation):
-    for name, controller in (("stiff", "goal_spring:SpringToGoal"), ("soft", "softer:Softer")):
-        sweep = ("sweep", SCENE, "arm.mass=1,2", "--unit", f"controller={controller}", "--no-report", "--out", name)
-        assert "2 of 2 runs done" in own.succeeded(*sweep)
-    assert "they differ in: controller" in own.succeeded("compare", "stiff", "soft", "--out", "both")
-    compared = json.loads((own.here / "both" / "comparison.json").read_text())
-    assert [point["parameters"] for point in compared["points"]] == [{"arm.mass": "1"}, {"arm.mass": "2"}]
+def test_a_campaign_is_carried_out_and_its_runs_are_compared(own: Installation):
+    units = "controller=goal_spring:SpringToGoal,softer:Softer"
+    sweep = ("sweep", SCENE, "--unit", units, "--stop", "0.2", "--workers", "1", "--out", "c")
+    assert "2 of 2 runs done" in own.succeeded(*sweep)
+    assert (own.here / "c" / "report.html").is_file()
+    stiff, soft = sorted((own.here / "c" / "runs").iterdir())
+    assert "they differ in: controller" in own.succeeded("compare", str(stiff), str(soft), "--out", "both")
     assert (own.here / "both" / "report.html").is_file()

@@ -5,7 +5,6 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
-from rich.console import Console
 
 from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.plan import CampaignPlan, PlannedRun
@@ -38,15 +37,6 @@ def test_each_point_has_its_rate_with_an_interval_and_its_medians(capsys: pytest
     assert " ".join(row) == "0.03 10 9 of 10 55 % to 100 % 4.5 mm"
 
 
-def test_long_names_are_broken_between_their_words(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("handover.scenarios.cli.summaries.campaign.open_console", lambda: Console(width=80))
-    plan = CampaignPlan(scenario="ir_grasp", points=[{"approach_disturbance_scale": "0.03"}])
-    metrics = {"final_distance_thumb": Metric(0.001, "m"), "true_distance_thumb": Metric(0.002, "m")}
-    rows = [done(run, metrics=metrics) for run in plan.runs()]
-    words = printed(plan, rows, capsys).split()
-    assert {"approach_", "disturbance_", "scale", "final_distance_", "thumb"} <= {*words}
-
-
 def test_of_many_points_and_reasons_the_first_are_reported(capsys: pytest.CaptureFixture[str]):
     plan = CampaignPlan(scenario="ir_grasp", points=[{"forward": f"0.{n}"} for n in range(100, 200)])
     broke = "the hand broke {} times"
@@ -66,8 +56,3 @@ def test_a_page_that_is_older_than_the_table_is_not_reported(tmp_path: Path, cap
         os.utime(folder.table, (0, folder.report.stat().st_mtime + age))
         print_report_place(folder)
         assert ("report: " in capsys.readouterr().out) == output
-
-
-def test_a_campaign_that_varies_nothing_has_one_row(capsys: pytest.CaptureFixture[str]):
-    plan = CampaignPlan(scenario="ir_grasp", points=[{}])
-    assert "1 of 1" in printed(plan, [done(run) for run in plan.runs()], capsys)

@@ -7,7 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.scenarios.study_server import HAND, act, page_at, served, server_of, to_instruction, told
+from support.scenarios.study_server import (
+    HAND,
+    act,
+    page_at,
+    served,
+    server_of,
+    to_instruction,
+    told,
+    without_runs,  # noqa: F401
+)
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
@@ -44,6 +53,7 @@ def test_a_tracker_leads_the_hand_and_its_pictures_are_timed_by_the_pages_clock(
         assert told(page, "tracker") is False
 
 
+@pytest.mark.usefixtures("without_runs")
 def test_a_tracker_is_told_why_it_is_refused(tmp_path: Path):
     with served(server_of(tmp_path / "study")) as where, page_at(where) as page:
         with (
