@@ -192,7 +192,6 @@ def together(fmu: FmuOf) -> Callable[[Algorithm], list[object]]:
     [
         (Algorithm.GAUSS_SEIDEL, True),
         pytest.param(Algorithm.JACOBI, False, marks=pytest.mark.slow),
-        pytest.param(Algorithm.JACOBI, True, marks=pytest.mark.slow),
     ],
 )
 def test_a_picture_lies_in_the_camera_s_memory_alone(
