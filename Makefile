@@ -17,7 +17,7 @@ INSTALL := $(BIN)/python -m pip install --quiet --no-compile --constraint constr
 
 WHEELS := x86_64-linux aarch64-linux x86_64-windows x86_64-darwin aarch64-darwin
 
-.PHONY: demo test test-changed test-slow fuzz paper real-time platforms hosts lint bench wording docs pictures notebook icons wheels install clean
+.PHONY: demo test test-changed test-slow fuzz paper real-time platforms hosts lint bench wording docs pictures icons wheels install clean
 
 demo: $(VENV)/.installed
 	$(BIN)/handover run helix_handover
@@ -71,10 +71,6 @@ docs: $(VENV)/.installed-docs
 # The README's pictures; needs chromium, too.
 pictures: $(VENV)/.installed-test
 	$(BIN)/python docs/pictures.py
-
-# The outputs in docs/python.ipynb.
-notebook: $(VENV)/.installed-test
-	$(BIN)/python tests/test_notebook.py
 
 # The units' icons as PNG, of their drawings in fmus/icons/.
 icons: $(VENV)/.installed-test

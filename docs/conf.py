@@ -1,5 +1,6 @@
 """The site, built by Sphinx: `make docs`. Pages of units, scenarios and commands are made from their declarations."""
 
+import shutil
 import sys
 from importlib.metadata import version as version_of
 from pathlib import Path
@@ -10,17 +11,17 @@ DOCS = Path(__file__).parent
 sys.path[:0] = [str(DOCS), str(DOCS.parent / "tests")]
 
 import declared_pages  # noqa: E402
+import tutorial_kernel  # noqa: E402
 
 project = "handover-cosim"
 author = "The handover-cosim authors"
 copyright = "the handover-cosim authors, MIT licence"  # noqa: A001
 version = release = version_of("handover-cosim")
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_click", "sphinx_copybutton"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_click", "sphinx_copybutton"]
 myst_enable_extensions = ["colon_fence", "dollarmath"]
 myst_heading_anchors = 3
-source_suffix = {".md": "markdown"}
-exclude_patterns = ["c_host", "build", "templates", "python.ipynb"]
+exclude_patterns = ["c_host", "build", "templates"]
 suppress_warnings = ["misc.highlighting_failure"]
 
 autodoc_typehints = "description"
@@ -28,6 +29,17 @@ autodoc_member_order = "bysource"
 add_module_names = False
 default_role = "literal"
 smartquotes = False
+
+# Tutorials: executed in an empty folder each, again where the product has changed.
+_TUTORIALS = DOCS / "build" / "tutorials"
+nb_execution_mode = "cache"
+nb_execution_cache_path = str(_TUTORIALS / tutorial_kernel.kernel(_TUTORIALS) / "outputs")
+nb_kernel_rgx_aliases = {".*": "tutorial"}
+nb_execution_in_temp = True
+nb_execution_excludepatterns = [] if shutil.which("octave-cli") else ["tutorials/octave.md"]
+nb_execution_raise_on_error = True
+nb_execution_timeout = 600
+nb_merge_streams = True
 
 html_theme = "furo"
 html_title = f"handover-cosim {release}"

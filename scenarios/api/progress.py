@@ -10,6 +10,8 @@ from typing import Any
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
+from handover.scenarios.execution.progress import is_terminal
+
 Move = Callable[[float, float, str], None]
 """Is called with what is done, of how much, and what that is in words."""
 
@@ -45,7 +47,7 @@ def _in_notebook() -> bool:
 def _terminal_bar() -> Generator[Move, None, None]:
     columns = (TextColumn("{task.description}"), BarColumn(bar_width=30), TimeElapsedColumn())
     console = Console(file=sys.stderr)
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
+    with Progress(*columns, console=console, transient=True, disable=not is_terminal(sys.stderr)) as progress:
         task = progress.add_task("", total=1.0)
         yield lambda done, total, text: progress.update(task, completed=done, total=total, description=text)
 

@@ -30,7 +30,7 @@ from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.campaign.worker_pool import RunCounts, WorkerPool
 from handover.scenarios.execution.errors import ClusterLost, RunNotWritten, UsageError, WorkersLost, one_line_errors
 from handover.scenarios.execution.exit_status import ABORTED, INTERRUPTED, UNIT_FAILED
-from handover.scenarios.execution.progress import say
+from handover.scenarios.execution.progress import is_terminal, say
 from handover.scenarios.execution.supervisor import leave
 
 _PAUSE = 30.0
@@ -55,7 +55,7 @@ class CampaignProgress:
         self._began = self._printed_at = clock()
         console = Console(file=stream)
         columns = (TextColumn("{task.description}"), BarColumn(bar_width=30), TextColumn("{task.fields[left]}"))
-        self._bar = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
+        self._bar = Progress(*columns, console=console, transient=True, disable=not is_terminal(stream))
         self._task = self._bar.add_task(_STARTING, total=None, left="")
         self._printing, self._ended = threading.Lock(), threading.Event()
         self._printer = threading.Thread(target=self._print_periodically, daemon=True)

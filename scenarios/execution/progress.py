@@ -2,6 +2,7 @@
 
 import contextlib
 import logging
+import sys
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from typing import TextIO
@@ -41,7 +42,7 @@ def progress_bar(stream: TextIO) -> Generator[Callable[[float, float], None], No
         _Pace(),
     )
     console = Console(file=stream)
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
+    with Progress(*columns, console=console, transient=True, disable=not is_terminal(stream)) as progress:
         task = progress.add_task("run", total=1.0, start=True)
 
         def move(t: float, end: float) -> None:
@@ -57,16 +58,20 @@ def doing(what: str) -> Generator[None, None, None]:
     Args:
         what: such as "drawing figures".
     """
-    console = Console(stderr=True)
-    if not console.is_terminal:
+    if not is_terminal(sys.stderr):
         with contextlib.suppress(OSError):  # as where a unit has closed the stream
             say(f"{what} ...")
         yield
         return
     columns = SpinnerColumn(), TextColumn(visible(what), markup=False), TimeElapsedColumn()
-    with Progress(*columns, console=console, transient=True) as progress:
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         progress.add_task(what, total=None)
         yield
+
+
+def is_terminal(stream: TextIO) -> bool:
+    """Say whether what moves on a stream is seen. FORCE_COLOR, which notebooks set, asks for colours alone."""
+    return not stream.closed and stream.isatty()
 
 
 LOG_LEVELS = ("debug", "info", "warning", "error")

@@ -34,7 +34,7 @@ def kept_run(*arguments: str) -> Path:
     `kept_run("run", "ir_grasp")` has the record, figures and page, `kept_run("run", "ir_grasp", "--no-report")` neither
     figures nor page, at a third of the time. A run that is judged to have failed is one, too.
     """
-    of_code = _KEPT / _code()
+    of_code = _KEPT / code_key()
     folder = of_code / hashlib.sha256(repr(arguments).encode()).hexdigest()[:16]
     wanted = folder / arguments[1].rpartition("/")[2]
     of_code.mkdir(parents=True, exist_ok=True)
@@ -55,7 +55,7 @@ def copied_run(target: Path, *arguments: str) -> Path:
 
 
 @cache
-def _code() -> str:
+def code_key() -> str:
     """Return what identifies product and environment; remove what has not been used for long."""
     digest = hashlib.sha256(sys.version.encode())
     digest.update(repr(sorted((d.name, d.version) for d in distributions())).encode())

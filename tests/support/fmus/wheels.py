@@ -18,9 +18,11 @@ def copy_sources(folder: Path) -> Path:
     tools = folder / "build-tools"
     (zig,) = re.findall(r'"ziglang==([\d.]+)"\]', (ROOT / "pyproject.toml").read_text())
     wanted = ["setuptools>=77", f"ziglang=={zig}"]
-    if metadata.version("ziglang") == zig:  # as it is large
-        tools.mkdir()
-        (tools / "ziglang").symlink_to(Path(str(metadata.distribution("ziglang").locate_file("ziglang"))))
+    for installed in metadata.distributions(name="ziglang"):
+        if installed.version != zig:
+            continue
+        tools.mkdir()  # links it, as it is large
+        (tools / "ziglang").symlink_to(Path(str(installed.locate_file("ziglang"))))
         del wanted[1]
     command = [sys.executable, "-m", "pip", "install", "--quiet", "--target", str(tools), *wanted]
     subprocess.run(command, check=True)

@@ -6,10 +6,10 @@ from pathlib import Path
 from support.commands import Ended, run_command
 from support.in_process_pool import use_in_process_pool
 
-TUTORIAL = Path(__file__).parents[3] / "docs" / "tutorial.md"
+TUTORIAL = Path(__file__).parents[3] / "docs" / "tutorials" / "own_scenario.md"
 SCENE = "reach:TwoLinkReach"
 QUIET = ("--no-report", "-p", "patience=0.2")
-_FILE = re.compile(r"^##+ [^\n]*`(?P<name>\w+\.py)`\n.*?^```python\n(?P<code>.*?)^```$", re.MULTILINE | re.DOTALL)
+_FILE = re.compile(r"^%%writefile (?P<name>\w+\.py)\n(?P<code>.*?)^```$", re.MULTILINE | re.DOTALL)
 SOFTER = """
 from goal_spring import Inputs, Outputs, Params, SpringToGoal
 
