@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
+from support.commands import data_in
 from support.cosim.native_units import native_fmu
 from support.kept_runs import kept_run
 from support.wording import Wording
@@ -91,6 +92,11 @@ def test_an_fmu_is_run_by_itself(tmp_path: Path):
     force = run.signals["Push.f_G"][:, 0]
     assert (force[run.signals.time < 0.24] == 0.0).all()
     assert force.max() == pytest.approx(2.0)
+
+
+def test_units_are_isolated(tmp_path: Path):
+    run = handover.run(native_fmu("gain"), stop=0.1, step=0.1, isolate="all", out=tmp_path / "i")
+    assert data_in(run.folder, "run")["master"]["isolated"] == ["all"]
 
 
 def test_a_unit_that_fails_is_a_result_without_success(tmp_path: Path):

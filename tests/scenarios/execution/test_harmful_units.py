@@ -89,11 +89,11 @@ def test_so_it_does_where_a_unit_closes_all_descriptors(
     ("bad", "text"),
     [
         ("hang_in_load", "bad: loading of its library at t = 0 s did not return within 0.5 s"),
-        ("hang_in_unload", "bad: unloading of its library at t = 1 s did not return within 0.5 s"),
-        ("hang_in_terminate", "bad: fmi3Terminate at t = 1 s did not return within 0.5 s"),
+        pytest.param("hang_in_unload", "bad: unloading of its library at t = 1 s did not return", marks=slow),
+        pytest.param("hang_in_terminate", "bad: fmi3Terminate at t = 1 s did not return within 0.5 s", marks=slow),
         ("error_in_terminate", "bad: fmi3Terminate at t = 1 s answered Error"),
-        ("crash_in_load", "unit bad crashed in loading of its library at t = 0 s: segm"),
-        ("crash_in_free", "unit bad crashed in fmi3FreeInstance at t = 1 s: segmentation fault"),
+        pytest.param("crash_in_load", "unit bad crashed in loading of its library at t = 0 s: segm", marks=slow),
+        pytest.param("crash_in_free", "unit bad crashed in fmi3FreeInstance at t = 1 s: segm", marks=slow),
         ("crash_in_unload", "unit bad crashed in unloading of its library at t = 1 s"),
     ],
 )

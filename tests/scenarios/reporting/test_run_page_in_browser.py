@@ -100,7 +100,6 @@ def view(page: Page) -> dict[str, float]:
     ("name", "azimuth", "elevation"),
     [
         ("start", np.arctan2(-0.7, -0.35), None),
-        ("front", -np.pi / 2.0, np.arctan(0.12)),
         ("side", np.pi, np.arctan(0.12)),
         ("top", -np.pi / 2.0, np.pi / 2.0),
     ],

@@ -58,8 +58,8 @@ def test_void_rounds_and_rounds_that_nobody_can_judge_do_not_count(tmp_path: Pat
     assert {a["round"] for a in analysis.answers} == {2, 3, 4}
 
 
-def effects_of(study: StudyFolder) -> dict[tuple[str, str], SignedRankTest]:
-    return {(e.effect, e.measure): e.test for e in StudyAnalysis(study).order_effects if e.test is not None}
+def effects_of(analysis: StudyAnalysis) -> dict[tuple[str, str], SignedRankTest]:
+    return {(e.effect, e.measure): e.test for e in analysis.order_effects if e.test is not None}
 
 
 def test_gains_by_practice_and_what_a_rigid_round_leaves_behind_are_told_apart_and_from_the_comparison(tmp_path: Path):
@@ -69,13 +69,13 @@ def test_gains_by_practice_and_what_a_rigid_round_leaves_behind_are_told_apart_a
         learnt = 1 + (planned.number + number % 3) // 2
         return {"S1": 5, "S2": learnt, "S3": 6 if before == "rigid" else 5}[statement]
 
-    study = write_study(tmp_path / "out", 12, rate)
-    effects = effects_of(study)
+    analysis = StudyAnalysis(write_study(tmp_path / "out", 12, rate))
+    effects = effects_of(analysis)
     assert effects["round", "S2"].estimate == pytest.approx(0.5, abs=0.02)
     assert effects["carry-over", "S3"].estimate == pytest.approx(1.0)
     assert max(effects[of].p for of in (("round", "S2"), ("period", "S2"), ("carry-over", "S3"))) < 0.001
     assert effects["round", "S1"].p == effects["carry-over", FAILURE].p == 1.0
-    tests = StudyAnalysis(study).rating_tests
+    tests = analysis.rating_tests
     assert all(t.p_holm is not None and t.p_holm > 0.9 for t in tests if t.statement != "S3")
 
 
@@ -91,8 +91,9 @@ def test_practice_is_not_taken_for_carry_over_where_rounds_are_void_and_orders_u
                     ratings = {"S1": 1 + 4 * (planned.period - 1), "S2": min(9, planned.number), "S3": 5}
                     folder.record_answers(planned.number, ratings)
             folder.record_questionnaire({"age_group": "21-30", "background": "engineering", "comments": ""})
-    assert len(StudyAnalysis(study).complete_sessions) == 7
-    effects = effects_of(study)
+    analysis = StudyAnalysis(study)
+    assert len(analysis.complete_sessions) == 7
+    effects = effects_of(analysis)
     period = effects["period", "S1"]
     assert (period.estimate, period.low, period.high) == pytest.approx((4.0, 4.0, 4.0))
     assert effects["carry-over", "S1"].p > 0.05

@@ -3,6 +3,7 @@
 import os
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -12,15 +13,17 @@ from handover.scenarios.campaign.results import CampaignResults
 from handover.scenarios.campaign.table import CampaignTable, RunRow
 from handover.scenarios.campaign.table_writer import table_of
 from handover.scenarios.campaign.worker_pool import RunCounts
-from handover.scenarios.cli.summaries.campaign import print_campaign, print_report_place
+from handover.scenarios.cli.summaries.campaign import campaign_data, print_campaign, print_report_place
 from handover.scenarios.experiment.experiment import Metric
 
 
-def printed(plan: CampaignPlan, rows: list[RunRow], capsys: pytest.CaptureFixture[str]) -> str:
+def told(plan: CampaignPlan, rows: list[RunRow], capsys: pytest.CaptureFixture[str]) -> tuple[str, list[Any]]:
+    """Return what is printed of a campaign, and its points as data."""
     output = {"scenario": plan.scenario, "points": plan.points, "repetitions": plan.repetitions}
     results = CampaignResults(output, CampaignTable(table_of(plan, rows)))
-    print_campaign(results, RunCounts(total=plan.size, ended=len(rows)), CampaignFolder(Path("c")))
-    return capsys.readouterr().out
+    of_campaign = (results, RunCounts(total=plan.size, ended=len(rows)), CampaignFolder(Path("c")))
+    print_campaign(*of_campaign)
+    return capsys.readouterr().out, campaign_data(*of_campaign)["points"]
 
 
 def done(run: PlannedRun, *, success: bool = True, metrics: Mapping[str, Metric] = {}) -> RunRow:
@@ -31,17 +34,20 @@ def test_each_point_has_its_rate_with_an_interval_and_its_medians(capsys: pytest
     plan = CampaignPlan(scenario="ir_grasp", points=[{"forward": "0.03"}], repetitions=10)
     metrics = [{"final_distance_thumb": Metric(0.001 * k, "m")} for k in range(10)]
     rows = [done(run, success=run.repetition < 9, metrics=metrics[run.repetition]) for run in plan.runs()]
-    output = printed(plan, rows, capsys)
+    output, (point,) = told(plan, rows, capsys)
     (row,) = [line.split() for line in output.splitlines() if " of 10 " in line and "runs" not in line]
     # Clopper and Pearson of 9 of 10, as in tables: 0.555 to 0.997
     assert " ".join(row) == "0.03 10 9 of 10 55 % to 100 % 4.5 mm"
+    assert "more reason" not in output
+    assert point["interval"] == pytest.approx([0.555, 0.997], abs=1e-3)
+    assert point["medians"]["final_distance_thumb"] == {"value": pytest.approx(0.0045), "unit": "m"}
 
 
 def test_of_many_points_and_reasons_the_first_are_reported(capsys: pytest.CaptureFixture[str]):
     plan = CampaignPlan(scenario="ir_grasp", points=[{"forward": f"0.{n}"} for n in range(100, 200)])
     broke = "the hand broke {} times"
     rows = [RunRow(run=run, status="failed", success=None, reason=broke.format(run.point % 10)) for run in plan.runs()]
-    output = printed(plan, rows, capsys)
+    output, _ = told(plan, rows, capsys)
     assert "and 88 points more" in output
     assert "10 failed: the hand broke 3 times" in output
     assert "and 5 more reasons, in the table" in output

@@ -19,10 +19,11 @@ from handover.scenarios.cli.command import main
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.request import RunRequest
 from handover.scenarios.execution.runner import run_task
-from handover.scenarios.results.task import InputSources
+from handover.scenarios.results.task import InputSources, Task
 from handover.scenarios.study.folder.study_folder import StudyFolder
 from handover.scenarios.study.plan.led_hands import led_hand_of, round_parameters
 from handover.scenarios.study.plan.plan import default_plan, parse_plan
+from handover.scenarios.study.session import round_check
 from handover.scenarios.study.session.round_check import first_difference
 
 pa: Any = pyarrow
@@ -70,9 +71,15 @@ def test_a_round_is_the_same_byte_for_byte_when_carried_out_again(played: Path):
     assert "other versions" not in done.output
 
 
-def test_a_changed_record_and_other_versions_are_told(played: Path, tmp_path: Path):
+def test_a_changed_record_and_other_versions_are_told(played: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     out = shutil.copytree(played, tmp_path / "out")
     folder = StudyFolder.read(out).session(1).run_folder(1)
+    sound = shutil.copytree(folder, tmp_path / "sound")
+
+    def repeat(task: Task, *_: object) -> None:
+        shutil.copytree(sound, task.folder.path, dirs_exist_ok=True)
+
+    monkeypatch.setattr(round_check, "run_task", repeat)
     table: Any = pq.read_table(folder / "signals.parquet")
     name = next(n for n in table.column_names if n.startswith("person.p_WH["))
     values = table.column(name).to_numpy().copy()
