@@ -71,14 +71,14 @@ def test_the_object_is_seen_late_and_felt_at_once():
 
 def test_fingers_get_the_object_where_they_close_near_enough_and_nowhere_else():
     got: dict[bool, int] = {True: 0, False: 0}
-    for seed in range(7):
+    for seed in range(5):
         scene = reaching(depth_error=0.05, sight_error=0.01, seed=seed, attempts=1)
         closing = scene.until(Activity.PULL)
         x, _, z = closing.p_WH - closing.p_WO - END
         held = scene.go(0.1).holder is Holder.BOTH
         assert held is (math.hypot(x, z) <= 0.04)
         got[held] += 1
-    assert min(got.values()) >= 2
+    assert min(got.values()) >= 1
 
 
 def test_a_hand_that_reaches_too_far_bumps_the_object_and_one_that_stops_short_does_not():
@@ -108,7 +108,7 @@ def test_a_hand_that_got_nothing_is_felt_and_tries_again_with_other_errors():
 
 def test_who_lets_go_before_the_fingers_have_closed_lets_the_object_float():
     early: list[bool] = []
-    spread: list[dict[str, Any]] = [{"timing_error": 0.5, "seed": seed} for seed in range(6)]
+    spread: list[dict[str, Any]] = [{"timing_error": 0.5, "seed": seed} for seed in range(4)]
     for changes in (*spread, {"haste": 1.0}, {"haste": 0.0}):
         both: dict[str, Any] = STRONG | changes
         scene = giving(replace(GIVING, reaction_time=0.1, **both))
@@ -116,7 +116,7 @@ def test_who_lets_go_before_the_fingers_have_closed_lets_the_object_float():
         scene.until(Activity.LET_GO, closure=1.0)
         early.append(scene.y.gripper_angle > 0.79)
         assert scene.y.holder is (Holder.FREE if early[-1] else Holder.GRIPPER)
-    assert 2 <= sum(early[:-2]) <= 4
+    assert 1 <= sum(early[:-2]) <= 3
     assert early[-2:] == [True, False]  # who is hasty lets go as soon as the fingers move
 
 

@@ -143,13 +143,17 @@ def test_robot_yields_to_a_pull_as_its_stiffness_says():
     assert loop.h.f_G[2] > 0.05
 
 
+def passes(loop: Loop, closure: float, speed: float) -> bool:
+    return any(speeds_of(loop, closure, 1)[0] > speed for _ in range(250))
+
+
 @pytest.mark.parametrize(("kind", "of_take", "of_give"), [("rigid", 0.059, 0.021), ("compliant", 0.08, 0.037)])
 def test_pull_and_push_pass_the_published_thresholds(kind: str, of_take: float, of_give: float):
     strong: dict[str, Any] = {"effort": 4.0, "arm_force_max": 6.0, "motion_again": Motion.NONE}
     take = gripped(0.032, kind=kind, motion=Motion.TAKE, seed=1, **strong)
-    assert max(speeds_of(take, 1.0, 250)) > of_take
+    assert passes(take, 1.0, of_take)
     give = replace(STILL, motion=Motion.GIVE, object_with=StartHolder.HAND, **strong)
-    assert max(speeds_of(Loop(give, 0.032, kind=kind), 0.0, 250)) > of_give
+    assert passes(Loop(give, 0.032, kind=kind), 0.0, of_give)
 
 
 def test_results_do_not_hang_on_the_step():
