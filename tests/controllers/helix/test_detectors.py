@@ -25,7 +25,7 @@ def test_the_published_detector_averages_what_the_joint_one_fits_and_its_covaria
     camera: StereoCamera,
 ):
     rng, errors, squares = np.random.default_rng(3), list[tuple[Floats, Floats]](), list[Floats]()
-    for _ in range(12):
+    for _ in range(8):
         u = anywhere(rng)
         shown = camera.step(0.0, 1 / 30, u)
         pair = Inputs(left=shown.left, right=shown.right)
@@ -34,7 +34,7 @@ def test_the_published_detector_averages_what_the_joint_one_fits_and_its_covaria
             errors.append((distances(joint, u), distances(published, u)))
         if published.seen_O and published.seen_R:
             squares.append(squared(published, u))
-    assert len(errors) >= 9
+    assert len(errors) >= 6
     joint, published = 1e3 * np.sqrt(np.mean(np.square(errors), axis=0))
     assert np.all(joint < [1.0, 1.0, 2.0])  # mm RMS of ball, wrist and gripper
     assert np.all(published < [15.0, 80.0, 90.0])

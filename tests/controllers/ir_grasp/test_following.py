@@ -222,7 +222,6 @@ def test_contact_closes_when_joints_or_tendon_feel_the_object_between_the_finger
     ("given", "p_WO", "thing", "met"),
     [
         ({}, (0.045, 0.075), {}, {Phase.SEARCH, Phase.RECOVER, Phase.TRACK, Phase.CLOSE, Phase.SHAKE, Phase.DONE}),
-        ({}, (0.0, 0.09), {}, {Phase.RECOVER, Phase.TRACK, Phase.CLOSE}),  # it is touched, and gone around
         (QUICK, (0.0, 0.006), SMALL, {Phase.SEARCH, Phase.RECOVER, Phase.CLOSE}),  # pushed along, and gone around
         ({"strategy": Strategy.CONTACT}, (0.045, 0.075), {}, {Phase.APPROACH, Phase.CLOSE}),
     ],
@@ -232,7 +231,7 @@ def test_it_goes_on_from_any_state_bit_for_bit(
 ):
     seen = grasp(reflex(**given), scene(p_WO, **thing), Phase.DONE if Phase.DONE in met else Phase.CLOSE)
     assert met <= phases(seen)
-    assert_passed_on(lambda: reflex(**given), [read(y) for _, y in seen], 5, DT)
+    assert_passed_on(lambda: reflex(**given), [read(y) for _, y in seen], 12, DT)
 
 
 def test_what_the_correction_on_the_move_cannot_work_with_is_refused(wording: Wording):
