@@ -44,8 +44,9 @@ def finished(experiment: type[PathExperiment]) -> tuple[Record, dict[str, float]
 
 
 @pytest.mark.slow
-def test_a_run_leaves_its_whole_folder():
-    out = kept_run("run", "vsl_hybrid")
+def test_a_run_leaves_its_whole_folder(tmp_path: Path):
+    out = tmp_path / "run"
+    run(VslHybrid, out, "points=5", "settle=1", "speed=0.2", drawn=True)
     figures = {p.name for p in (out / "figures").iterdir()}
     assert figures == {f"{n}.{s}" for n in ("path", "shape", "errors", "error", "signals") for s in ("png", "svg")}
     assert (out / "report.html").is_file()

@@ -175,6 +175,7 @@ def test_runs_without_chance_do_not_depend_on_their_seed(tmp_path: Path):
     assert found[0] == found[1]
 
 
+@pytest.mark.slow
 def test_without_records_there_are_no_curves(tmp_path: Path, sketches: Sketches):
     HAND_OVER.draw(table_of(), tmp_path, tmp_path)
     sketches.check("margins", "strength")

@@ -64,7 +64,8 @@ def test_the_table_has_a_row_for_each_loop_and_step():
     assert rigid[2:] == ["14.7", "14", "16"]
 
 
-@pytest.mark.parametrize("broken_off", [pytest.param(False, marks=pytest.mark.slow), True])
+@pytest.mark.slow
+@pytest.mark.parametrize("broken_off", [False, True])
 def test_its_figure_is_drawn_of_all_loops_and_of_a_campaign_that_was_broken_off_in_its_first(
     broken_off: bool, tmp_path: Path, sketches: Sketches
 ):
