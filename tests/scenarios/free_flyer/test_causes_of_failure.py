@@ -2,24 +2,23 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 from support.scenarios.flyer_runs import metric, run
+from support.wording import Wording
 
 from handover.scenarios.free_flyer.handover.handovers import (
     Collaborative,
-    FailedReception,
     FlyerHandover,
     HumanToRobot,
     RobotToHuman,
 )
-from handover.scenarios.free_flyer.handover.person_evaluation import Cause
+from handover.scenarios.free_flyer.handover.person_evaluation import Cause, PersonsDeeds
 
 NOBODY = "person.motion=none"
 ASIDE = ("sight_error=0.1", "depth_error=0", "patience=20")
 UNGATED = (NOBODY, "gated=false", "decision.gate_error=0.2")
-PUSHES_AGAIN = ("person.motion_again=push",)
-ONE_ATTEMPT = ("skill=0", "verify=true", "decision.attempts=1")
 
 
 @dataclass(frozen=True)
@@ -41,9 +40,6 @@ STAGED = (
     Staged(Cause.BUMPED, "which bumped the object", ("skill=0",)),
     Staged(Cause.RELEASED_UNHELD, "nobody had pulled, but it saw its gripper move at", UNGATED),
     Staged(Cause.LET_GO_EARLY, "before the fingers closed", ("person.haste=1",), HumanToRobot),
-    Staged(Cause.RECEPTIONS_FAILED, "gave up after 5 failed receptions", PUSHES_AGAIN, FailedReception),
-    Staged(Cause.TORN_OUT, "torn out of the closed gripper", ("person.grip_force_max=0.01",)),
-    Staged(Cause.DELIVERIES_FAILED, "still held what it had released", ONE_ATTEMPT, seed=9),
 )
 """Other causes are told by staged signals, see test_handover_evaluation.py."""
 
@@ -59,7 +55,26 @@ def test_the_verdict_names_what_was_staged_to_go_wrong(tmp_path: Path, staged: S
     assert not ended.outcome.success
 
 
-"""What ends soon; the other runs cost some 2 s each."""
+LED: tuple[tuple[dict[str, Any], str, float | None, Cause], ...] = (
+    ({"by_track": True}, "pull", 5.0, Cause.NOT_TRIED),
+    ({"by_track": True}, "pull", None, Cause.NOT_TRIED),
+    ({"by_track": True, "nearest": 0.5, "tried": True}, "pull", 30.0, Cause.NOT_TRIED),
+    ({"nearest": 0.4}, "pull", None, Cause.NOT_TRIED),
+    ({"nearest": 0.4}, "push", None, Cause.NOT_TRIED),
+)
+"""What is known of a hand that is led, what it was to do, when its track ended, and why it did not."""
+
+
+def test_a_hand_that_is_led_and_did_not_answer_or_opened_too_soon_is_told(wording: Wording):
+    for known, touch, ended, cause in LED:
+        found, why = PersonsDeeds(led=True, **known).untouched(touch, 21.0, ended)
+        assert found is cause
+        wording.check(why)
+    for by_track in (True, False):
+        found, why = PersonsDeeds(led=True, by_track=by_track, opened=(20.0, 0.51)).dropped(21.0)
+        assert found is Cause.LET_GO_EARLY
+        wording.check(why)
+    assert PersonsDeeds(led=True, opened=(17.0, 0.51)).dropped(21.0)[0] is Cause.SLIPPED
 
 
 @pytest.mark.slow

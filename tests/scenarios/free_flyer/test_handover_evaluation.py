@@ -121,6 +121,13 @@ FAILED: dict[str, tuple[int, list[tuple[float, Signals]], Cause]] = {
         waits(Phase.RETREAT, HAND, 25.0, 40.0, away=0.02) + waits(Phase.GIVEN_UP, HAND, 55.0),
         Cause.NOT_RETREATED,
     ),
+    "a gripper that still holds what it released": (
+        7,
+        waits(Phase.RELEASE_OBJECT, GRIPPER, 23.5, speed=0.06)
+        + waits(Phase.VERIFY_RELEASE, GRIPPER, 24.0)
+        + waits(Phase.GIVEN_UP, GRIPPER, 26.0, undelivered=1),
+        Cause.DELIVERIES_FAILED,
+    ),
     "an object that is still in both hands at the end": (8, waits(Phase.DONE, Holder.BOTH, 30.0), Cause.OTHER),
     "a run that was cut short": (6, [], Cause.OUT_OF_TIME),
     "an object that floated free, even if it was caught": (
@@ -195,6 +202,18 @@ def test_the_staged_failure_must_have_been_noticed(wording: Wording):
     ):
         assert not unnoticed.outcome().success
         wording.check(unnoticed.outcome().reason)
+
+
+def test_a_robot_that_received_in_vain_too_often_says_how_often(wording: Wording):
+    outcome = follow(
+        HandoverEvaluator(HandoverParameters(), ("GRIPPER",)),
+        *waits(Phase.SIGNAL, HAND, 11.0),
+        *waits(Phase.CHECK_VELOCITY, HAND, 12.0),
+        *waits(Phase.CHECK_ANGLE, HAND, 21.0, failed=4),
+        *waits(Phase.GIVEN_UP, HAND, 22.0, failed=5),
+    ).outcome()
+    assert outcome.metrics["decided_by"].value == Cause.RECEPTIONS_FAILED
+    wording.check(outcome.reason)
 
 
 def asked_again() -> HandoverEvaluator:

@@ -14,19 +14,11 @@ from handover.cosim.system.system import System
 from handover.scenarios.cli.command import main
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters
-from handover.scenarios.free_flyer.handover.handovers import (
-    Collaborative,
-    FailedReception,
-    FlyerHandover,
-    HandoverOfTask,
-    HumanToRobot,
-    RobotToHuman,
-)
+from handover.scenarios.free_flyer.handover.handovers import FlyerHandover, HandoverOfTask, RobotToHuman
 from handover.scenarios.free_flyer.handover.person_evaluation import Cause
 from handover.scenarios.free_flyer.two_robots.two_robots import TwoRobots
 
 INPUTS_OF_HAND = ("p_WH_track", "q_WH_track", "finger_track", "closed_track", "age")
-ALL = (RobotToHuman, HumanToRobot, FailedReception, Collaborative, HandoverOfTask)
 
 
 def built(scenario: type[Experiment[Any]], *given: str) -> System:
@@ -34,7 +26,7 @@ def built(scenario: type[Experiment[Any]], *given: str) -> System:
     return scenario().build(parse_parameters(scenario, given), 0, lambda name: fmu(scenario.units[name]))
 
 
-@pytest.mark.parametrize("scenario", ALL)
+@pytest.mark.parametrize("scenario", [RobotToHuman, HandoverOfTask])
 def test_the_five_inputs_of_a_hand_come_from_outside_and_nothing_else(scenario: type[FlyerHandover]):
     outside, simulated = built(scenario, "hand=outside"), built(scenario)
     assert [str(end) for end in outside.externals] == [f"person.{name}" for name in INPUTS_OF_HAND]
@@ -44,21 +36,12 @@ def test_the_five_inputs_of_a_hand_come_from_outside_and_nothing_else(scenario: 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("scenario", "words", "holder"),
-    [
-        (HumanToRobot, "the object in the hand came no nearer than", {2}),
-        (RobotToHuman, "the hand was never closed; the nearest that it came", {0, 1}),
-    ],
-)
-def test_a_hand_that_nothing_leads_keeps_or_takes_nothing_and_no_simulated_person_is_blamed(
-    tmp_path: Path, scenario: type[FlyerHandover], words: str, holder: set[int]
-):
-    ended = run(scenario, tmp_path / "run", "hand=outside", "patience=15")
-    assert words in ended.outcome.reason
+def test_a_hand_that_nothing_leads_takes_nothing_and_no_simulated_person_is_blamed(tmp_path: Path):
+    ended = run(RobotToHuman, tmp_path / "run", "hand=outside", "patience=15")
+    assert "the hand was never closed; the nearest that it came" in ended.outcome.reason
     assert metric(ended, "decided_by") == Cause.NOT_TRIED
     record = Record(tmp_path / "run" / "signals.parquet")
-    assert set(record["person.holder"].tolist()) == holder
+    assert set(record["person.holder"].tolist()) == {0, 1}
     assert (record["person.age"] > 0.2).all()
     assert np.ptp(record["person.p_WH"], axis=0).max() == 0.0
     assert record["person.activity"].max() == 0

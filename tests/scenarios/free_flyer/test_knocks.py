@@ -51,8 +51,9 @@ def test_a_long_knock_is_taken_for_a_pull_and_sends_the_object_off():
 
 
 @pytest.mark.slow
-def test_a_person_hands_over_with_a_gradual_gripper(tmp_path: Path):
-    ended = run(HumanToRobot, tmp_path / "r", "behaviour=compliant", "gradual=true")
+def test_a_person_hands_over_with_a_gradual_gripper_in_another_place(tmp_path: Path):
+    given = "behaviour=compliant", "gradual=true", "p_WG_handover=0.2,-0.2,0.15"
+    ended = run(HumanToRobot, tmp_path / "r", *given, seed=2)
     assert ended.outcome.success, ended.outcome.reason
     assert metric(ended, "transfer_time") < 5.0
 

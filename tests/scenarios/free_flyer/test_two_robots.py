@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.scenarios.flyer_runs import fmu, kept, metric, run
+from support.scenarios.flyer_runs import fmu, metric, run
 from support.sketched_figures import Sketches
 from support.sketched_figures import sketches as sketches
 from support.wording import Wording
@@ -24,16 +24,6 @@ def cause(metrics: float) -> TeamCause:
     return TeamCause(int(metrics))
 
 
-def test_two_robots_give_a_large_object_to_a_person():
-    done = kept("flyer_two_robots")
-    assert done.success, done.reason
-    assert done.metric("squeeze") < 0.5
-    assert done.metric("turn") < 0.1
-    assert done.metric("release_gap") == 0.0
-    assert done.metric("clearance") > 0.03
-
-
-@pytest.mark.slow
 def test_a_person_gives_a_large_object_to_two_compliant_robots(tmp_path: Path):
     done = run(TwoRobots, tmp_path / "run", "task=human_to_robots", "behaviour=compliant", seed=1)
     assert done.outcome.success, done.outcome.reason
@@ -44,30 +34,36 @@ def test_a_person_gives_a_large_object_to_two_compliant_robots(tmp_path: Path):
 @pytest.mark.slow
 def test_by_themselves_grippers_let_go_one_after_the_other(tmp_path: Path):
     """A hand at one end draws one gripper sooner than the other; the team's mean decides for both."""
-    assert metric(run(TwoRobots, tmp_path / "run", "hands=one_at_end", "together=false"), "release_gap") > 0.1
+    done = run(TwoRobots, tmp_path / "run", "hands=one_at_end", "together=false", stop=37.0)
+    assert metric(done, "release_gap") > 0.1
 
 
 @pytest.mark.slow
-def test_robots_that_verify_a_slow_release_do_not_disturb_the_person(tmp_path: Path):
+def test_robots_that_verify_a_slow_release_give_a_large_object_to_a_person_and_do_not_disturb_it(tmp_path: Path):
     """At the published thresholds they coast on into the object, see the failures below."""
     done = run(TwoRobots, tmp_path / "run", "verify=true", "strength=1", "decision.release_velocity=0.011")
     assert done.outcome.success, done.outcome.reason
-    assert metric(done, "failed_deliveries") == 0.0
+    assert metric(done, "failed_deliveries") == metric(done, "release_gap") == 0.0
+    assert metric(done, "squeeze") < 0.5
+    assert metric(done, "turn") < 0.1
+    assert metric(done, "clearance") > 0.03
 
 
-ONE_AT_END = ("task=human_to_robots", "hands=one_at_end", "decision.attempts=2")
+ONE_AT_END = ("task=human_to_robots", "hands=one_at_end", "decision.attempts=1")
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("given", "why", "metric_of_it"),
+    ("given", "stop", "why", "metric_of_it"),
     [
-        (ONE_AT_END, TeamCause.ONE_RECEIVED_ALONE, "failed_receptions"),  # both open again
-        (("verify=true",), TeamCause.RAN_INTO_IT, "failed_deliveries"),
+        (ONE_AT_END, None, TeamCause.ONE_RECEIVED_ALONE, "failed_receptions"),
+        (("verify=true",), 42.0, TeamCause.RAN_INTO_IT, "failed_deliveries"),
     ],
 )
-def test_a_run_that_fails_says_why(given: tuple[str, ...], why: TeamCause, metric_of_it: str, tmp_path: Path):
-    done = run(TwoRobots, tmp_path / "run", *given)
+def test_a_run_that_fails_says_why(
+    given: tuple[str, ...], stop: float | None, why: TeamCause, metric_of_it: str, tmp_path: Path
+):
+    done = run(TwoRobots, tmp_path / "run", *given, stop=stop)
     assert not done.outcome.success
     assert cause(metric(done, "decided_by")) is why, done.outcome.reason
     assert metric(done, metric_of_it) >= (why is TeamCause.ONE_RECEIVED_ALONE)
@@ -75,8 +71,8 @@ def test_a_run_that_fails_says_why(given: tuple[str, ...], why: TeamCause, metri
 
 @pytest.mark.slow
 def test_robots_that_do_not_come_to_rest_tell_how_far_from_their_places_they_were(tmp_path: Path):
-    noise = (f"navigation_{i}.velocity_noise=0.015" for i in (1, 2))
-    done = run(TwoRobots, tmp_path / "run", *noise)
+    noise = (f"navigation_{i}.velocity_noise=0.03" for i in (1, 2))
+    done = run(TwoRobots, tmp_path / "run", "task=human_to_robots", "patience=14", *noise)
     assert cause(metric(done, "decided_by")) is TeamCause.OUT_OF_REACH, done.outcome.reason
     away = re.findall(r"gripper (\d) was (\d+) mm from its place", done.outcome.reason)
     record = Record(tmp_path / "run" / "signals.parquet")
@@ -91,13 +87,13 @@ def test_robots_that_do_not_come_to_rest_tell_how_far_from_their_places_they_wer
 
 
 def test_a_run_is_drawn_with_its_moments_and_curves(tmp_path: Path, sketches: Sketches):
-    run(TwoRobots, tmp_path / "run", "hands=one_at_middle", stop=1.0)
+    run(TwoRobots, tmp_path / "run", "hands=one_at_middle", stop=0.3)
     parameters = parse_parameters(TwoRobots, ("hands=one_at_middle",))
     record, evaluator = Record(tmp_path / "run" / "signals.parquet"), TeamEvaluator(parameters)
-    evaluator.robots[0].signalled, evaluator.robots[1].felt = 0.2, 0.7
+    evaluator.robots[0].signalled, evaluator.robots[1].felt = 0.1, 0.2
     TwoRobots().draw(parameters, evaluator, record, tmp_path)
     titles = [axes.get_title().partition("\n")[0] for axes in sketches["scene"].axes]
-    assert titles[:4] == ["0.0 s, start", "0.2 s, signal", "0.7 s, pull felt", "1.0 s, end"]
+    assert titles[:4] == ["0.0 s, start", "0.1 s, signal", "0.2 s, pull felt", "0.3 s, end"]
     plots = [plot for figure in TwoRobots().time_figures(parameters, record) for plot in figure.plots]
     assert len({plot.title for plot in plots}) == len(plots)
     assert not any("hand 2" in curve.label for plot in plots for curve in plot.curves)
