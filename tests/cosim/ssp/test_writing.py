@@ -17,7 +17,7 @@ from support.wording import Wording
 from handover.cosim.exceptions import NotExportable, WiringError
 from handover.cosim.master.master import Master
 from handover.cosim.ssp.ssp_file import SspFile
-from handover.cosim.ssp.writing import write_ssp
+from handover.cosim.ssp.writing import bound_enumerations, write_ssp
 from handover.cosim.system.conversion import LinearTransformation
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PortName, System
@@ -75,6 +75,12 @@ def test_arrays_enumerations_and_pictures_keep_to_the_schema_of_2_0(fmu: FmuOf, 
     s = echoing(fmu, "n", "odd", "light", "pair", "picture")
     s.units["counter"] = replace(s.units["counter"], period=Fraction(1, 3), sampled=True)
     assert len(expect_valid(write_ssp(s, tmp_path / "a.ssp", "a"), "2.0")) == 3
+
+
+def test_enumerations_that_other_tools_must_find_in_the_fmu_are_named_with_their_numbers(fmu: FmuOf):
+    units = echoing(fmu).units
+    assert bound_enumerations(units["counter"]) == {}
+    assert bound_enumerations(units["echo"]) == {"light": 2}
 
 
 def test_a_step_that_is_not_the_fmu_s_own_is_kept_in_an_annotation(fmu: FmuOf, tmp_path: Path):

@@ -48,6 +48,15 @@ def test_each_finger_has_its_own_constants():
     np.testing.assert_array_equal(off.range, usual.range)
 
 
+@pytest.mark.parametrize("closure", [0.6, 0.9])
+def test_a_hand_sees_its_own_fingers_and_palm_alike_however_it_is_turned(closure: float):
+    p = replace(QUIET, p_WO_0=np.array([0.45, 0.35]), p_WH_0=np.array([-0.2, 0.05]), sigma_0=closure)
+    alone = ticks(p, fingers_seen=True)
+    assert np.max(alone) > 200
+    for yaw in (0.9, -2.0):
+        np.testing.assert_allclose(ticks(p, fingers_seen=True, yaw_H_0=yaw), alone, atol=1.0)
+
+
 def test_tolerances_are_drawn_by_the_seed_within_their_size():
     p = replace(QUIET, sensor_tolerance=0.1)
     usual, off = ticks(QUIET), np.array([ticks(p, seed=s) for s in range(12)])

@@ -27,6 +27,12 @@ from handover.scenarios.ir_grasp.sensor_curve import (
 )
 
 
+def test_a_finger_is_the_one_of_its_name():
+    """The thumb is to the right of the palm, the other two to the left."""
+    origins, _ = sensor_rays(np.zeros(2), 0.0, np.zeros(JOINTS))
+    assert [bool(origins[finger][1] > 0) for finger in (Finger.THUMB, Finger.INDEX, Finger.RING)] == [False, True, True]
+
+
 @pytest.mark.parametrize("finger", Finger)
 def test_the_beam_meets_the_face_at_the_distance_and_the_angle(finger: Finger):
     for incidence in (0.0, -0.4, 0.4):

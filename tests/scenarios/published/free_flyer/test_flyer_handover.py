@@ -22,6 +22,7 @@ from handover.scenarios.published.free_flyer.flyer_approaches import CASES, Flye
 from handover.scenarios.published.free_flyer.flyer_handover import FlyerHandoverTable
 from handover.scenarios.published.free_flyer.flyer_handover_figures import figure_number
 from handover.scenarios.published.free_flyer.handover_runs import (
+    ARMS,
     AT_PUBLISHED_RATE,
     EXCHANGES,
     GIVING,
@@ -50,6 +51,11 @@ def row_of(run: Any, **measured: Any) -> dict[str, Any]:
     row |= {name: given.get(name, "") for name in AT_PUBLISHED_RATE}
     row["p_WG_handover"] = [float(x) for x in given.get("p_WG_handover", "0,-0.07,0").split(",")]
     return row | measured
+
+
+def test_robots_with_other_arms_are_called_by_how_much_longer_these_are():
+    found = {v.label: float(v.parameters["arm_factor"]) for v in ARMS}
+    assert found == {"arm -50 %": 0.5, "arm +50 %": 1.5}
 
 
 @cache
