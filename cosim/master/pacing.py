@@ -50,7 +50,8 @@ class PaceReport:
         late = self.largest_lateness
         lateness = f"{late * 1000:.3g} ms" if late < 0.1 else f"{late:.2f} s"
         share = f"{self.missed} of {self.deadlines} ({self.share:.1%})"
-        return f"{share}, at most {lateness} late, at t = {self.latest_at:.6g} s"
+        at = "" if self.latest_at is None else f", at t = {self.latest_at:.6g} s"
+        return f"{share}, at most {lateness} late{at}"
 
 
 class Pacer:

@@ -16,14 +16,14 @@ PortName = Annotated[str, Meta(pattern=r".\..")]
 """A port with its unit, `UNIT.PORT`."""
 
 
-class AdaptiveData(TypedDict, total=False):
+class AdaptiveData(TypedDict):
     """Step control, as in `MasterOptions.as_data`."""
 
     relative: float
     absolute: float
-    initial: ExactSeconds | None
-    smallest: ExactSeconds | None
-    largest: ExactSeconds | None
+    initial: NotRequired[ExactSeconds | None]
+    smallest: NotRequired[ExactSeconds | None]
+    largest: NotRequired[ExactSeconds | None]
 
 
 class MasterData(TypedDict):

@@ -4,6 +4,7 @@ The command line and the report page show the same rows.
 """
 
 from collections.abc import Mapping
+from dataclasses import fields
 from typing import Any, cast
 
 from handover.cosim.master.pacing import PaceReport
@@ -20,8 +21,8 @@ def master_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
     rows = [("algorithm", master["algorithm"]), ("extrapolation", master["extrapolation"])]
     if "iterations" in metrics or Algorithm(master["algorithm"]).iterates:
         rows.append(("tolerance of iterations", f"{master['tolerance']:g}, after at most {master['iterations']}"))
-    if "iterations" in metrics:
-        mean, rollbacks = (metrics[name]["value"] for name in ("iterations", "rollbacks"))
+    mean, rollbacks = (metrics.get(name, {}).get("value") for name in ("iterations", "rollbacks"))
+    if mean is not None and rollbacks is not None:
         rows.append(("iterations", f"{mean:.3g} a step, {rollbacks:.0f} rollbacks"))
     control = master["adaptive"]
     if control:
@@ -38,7 +39,8 @@ def pace_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Return name and value of how a run kept pace with real time; no rows if it was not paced."""
     if not summary.get("pace"):
         return []
-    report = PaceReport(**{k: v for k, v in summary["pace"].items() if k != "share"})
+    known = {f.name for f in fields(PaceReport)}
+    report = PaceReport(**{k: v for k, v in summary["pace"].items() if k in known})
     if report.changed:
         rows = [("pace", f"changed on the way, {_pace(report.first)} at first, {_pace(report.pace)} at last")]
         return [*rows, ("deadlines missed at the last pace", str(report))] if report.deadlines else rows

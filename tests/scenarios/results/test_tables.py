@@ -6,6 +6,7 @@ from fractions import Fraction
 from html import unescape
 from pathlib import Path
 
+import pytest
 from support.commands import call
 from support.failing_systems import failing_ssp, native_fmu
 from support.faults.faulty_units import faulty_fmu
@@ -13,6 +14,7 @@ from support.faults.faulty_units import faulty_fmu
 import handover
 from handover.cosim.ssp.writing import write_ssp
 from handover.cosim.system.system import System
+from handover.cosim.typed_data import InvalidData, checked
 from handover.scenarios.reporting.run_page import write_run_page
 from handover.scenarios.results.folder_data import Summary
 from handover.scenarios.results.run_folder import RunFolder
@@ -126,6 +128,19 @@ def test_iterations_are_reported_once():
         ("iterations", "2.5 a step, 7 rollbacks"),
         ("steps that a unit discards", "repeated shorter by all"),
     ]
+
+
+def test_what_another_version_s_summary_lacks_has_no_row():
+    lacking = {"iterations": {"value": None}, "rollbacks": {"value": 7.0}}
+    master = {"algorithm": "jacobi", "extrapolation": "hold", "adaptive": None, "repeat_discarded": False}
+    assert master_rows({"master": {**master, "tolerance": 1e-8, "iterations": 9}, "metrics": lacking})[2:] == [
+        ("tolerance of iterations", "1e-08, after at most 9")
+    ]
+    pace = {"pace": 1.0, "deadlines": 4, "missed": 1, "largest_lateness": 0.5, "latest_at": None, "of_later": 1}
+    assert pace_rows({"pace": pace})[1] == ("deadlines missed", "1 of 4 (25.0%), at most 0.50 s late")
+    with pytest.raises(InvalidData, match="relative"):
+        checked({"master": {**master, "tolerance": 1.0, "iterations": 9, "adaptive": {}}, "success": True,
+                 "reason": "", "metrics": {}}, Summary)  # fmt: skip
 
 
 def test_a_failure_s_log_is_shown_and_what_is_not_known_is_not_zero(tmp_path: Path):
