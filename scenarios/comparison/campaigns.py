@@ -203,7 +203,11 @@ def _column(entry: CampaignEntry, metric: str) -> str:
     return metric if metric in columns else f"{metric}_metric"
 
 
-_KEPT = ("repetition", "seed", "status", "success", "reason")
+_KEPT = {
+    **dict.fromkeys(("repetition", "seed"), pa.int64()),
+    **dict.fromkeys(("status", "reason"), pa.string()),
+    "success": pa.bool_(),
+}
 
 
 def _merged(entries: Sequence[CampaignEntry], numbers: Sequence[Mapping[int, int]]) -> CampaignTable:
@@ -214,10 +218,16 @@ def _merged(entries: Sequence[CampaignEntry], numbers: Sequence[Mapping[int, int
 
 
 def _renumbered(entry: CampaignEntry, numbers: Mapping[int, int]) -> Any:
-    """Return a campaign's runs, named with the campaign, with their points' new numbers and metrics' own names."""
+    """Return a campaign's runs, named with the campaign, with their points' new numbers and metrics' own names.
+
+    Columns have one type, whatever the table has: two that differ, as integers and floats, are not always merged.
+    """
     table: Any = entry.results.table.table
     metrics = _metrics(entry)
     part = table.select([*_KEPT, *(_column(entry, name) for name in metrics)]).rename_columns([*_KEPT, *metrics])
+    kinds = {**_KEPT, **dict.fromkeys(metrics, pa.float64())}
+    schema = pa.schema([part.schema.field(name).with_type(kind) for name, kind in kinds.items()])
+    part = part.cast(schema, safe=False) if len(part) else schema.empty_table()  # of which no type was checked
     runs = pa.array([f"{entry.name}: {run}" for run in table.column("run").to_pylist()], pa.string())
     points = pa.array([numbers.get(k, -1) for k in table.column("point").to_pylist()], pa.int64())
     return part.append_column("run", runs).append_column("point", points)

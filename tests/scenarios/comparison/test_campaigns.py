@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import pyarrow.parquet as pq
 import pytest
 from support.campaigns import campaign_metadata, folder_of, table_of
 
@@ -145,6 +146,15 @@ def test_a_metric_that_one_lacks_is_shown_where_it_is(tmp_path: Path):
     assert a.startswith("a,6,6,3,0.5,")
     assert a.endswith(",0.01,,,,,")
     assert b.endswith(",0.02,,,0.5,,")
+
+
+def test_columns_of_other_types_in_tables_of_other_versions_are_merged(tmp_path: Path):
+    whole = campaign(tmp_path / "a", [{}], metrics={"moved": [2**60] * 6})
+    real = campaign(tmp_path / "b", [{}], metrics={"moved": [0.5] * 6})
+    begun = campaign(tmp_path / "c", [{}], metrics={"moved": ["0.5"] * 6})
+    pq.write_table(pq.read_table(begun / "runs.parquet").slice(0, 0), begun / "runs.parquet")
+    results = compared(whole, real, begun)
+    assert results.table.column("moved").tolist() == [2.0**60] * 6 + [0.5] * 6
 
 
 def test_settings_in_which_campaigns_differ_are_listed(tmp_path: Path):
