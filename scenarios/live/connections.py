@@ -7,12 +7,14 @@ keep out the pages of other sites that a browser has open.
 import asyncio
 import contextlib
 import json
+import logging
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from typing import Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
+from uvicorn.protocols.http.h11_impl import H11Protocol
 
 HEADERS = {
     "Cache-Control": "no-store",
@@ -29,6 +31,45 @@ PATIENCE = 2.0
 """How long the other end may take to receive a message, s."""
 REFUSAL_PERIOD = 0.5
 """Time between two refusals for one reason that a device is told, s: a flood is not answered with another one."""
+MOST_CONNECTIONS = 128
+"""Connections at a time: a process that has no file left for one more is told of it by Python without end."""
+BACKLOG = 32
+"""Connections that are taken in at once, before any of them is counted."""
+LONGEST_WAIT = 10.0
+"""How long a connection may be open without a request that is whole, s."""
+
+
+class BoundedConnection(H11Protocol):
+    """A connection that is closed where it is one too many, or asks for nothing: opening some needs no token."""
+
+    longest_wait = LONGEST_WAIT
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        """Take in a connection."""
+        super().connection_made(transport)
+        if len(self.connections) > MOST_CONNECTIONS:
+            transport.abort()
+        else:
+            self.loop.call_later(self.longest_wait, self._close_idle)
+
+    def _close_idle(self) -> None:
+        if self not in self.connections:  # it has ended, or is a WebSocket, which is another object
+            return
+        if self.cycle and not self.cycle.response_complete:
+            self.loop.call_later(self.longest_wait, self._close_idle)
+        else:
+            self.transport.abort()
+
+
+class _FaultsOfClients(logging.Filter):
+    """Leaves out what the other end did wrong, which has ended its connection."""
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        """Return whether a record is of something else."""
+        return not record.getMessage().startswith(("Invalid UTF-8", "ASGI callable returned without completing"))
+
+
+logging.getLogger("uvicorn.error").addFilter(_FaultsOfClients())
 
 
 class BinaryMessage(ValueError):

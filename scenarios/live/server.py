@@ -19,6 +19,7 @@ from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.routing import Route, WebSocketRoute
 
 from handover.cosim.master.live_control import LiveControl
+from handover.scenarios.live.connections import BACKLOG, BoundedConnection
 from handover.scenarios.live.live_page import LivePage
 from handover.scenarios.live.process import CONTROL_FILE, HOST, wait_for_end_of_input
 from handover.scenarios.live.shown_run import ShownRun
@@ -59,6 +60,8 @@ async def serve(page: LivePage, work: Coroutine[Any, Any, None], listening: sock
     config = uvicorn.Config(
         application,
         log_level="error",
+        http=BoundedConnection,
+        backlog=BACKLOG,
         ws="websockets-sansio",
         ws_max_size=4 * page.longest,
         lifespan="off",

@@ -23,7 +23,7 @@ from starlette.responses import HTMLResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
-from handover.scenarios.live.connections import HEADERS, POLICY_VIOLATION, is_same_origin
+from handover.scenarios.live.connections import BACKLOG, HEADERS, POLICY_VIOLATION, BoundedConnection, is_same_origin
 from handover.scenarios.live.webcam import WEBCAM_SCRIPTS, WebcamFiles
 from handover.scenarios.reporting.html import json_html
 from handover.scenarios.reporting.page import asset, plain_page_html, template
@@ -162,6 +162,8 @@ def uvicorn_config(server: StudyServer) -> uvicorn.Config:
     return uvicorn.Config(
         server.application(),
         log_level="error",
+        http=BoundedConnection,
+        backlog=BACKLOG,
         ws="websockets-sansio",
         ws_max_size=4 * LONGEST,
         server_header=False,

@@ -3,8 +3,10 @@
 import asyncio
 import contextlib
 import json
+import socket
 from collections.abc import Generator
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import pytest
 from starlette.websockets import WebSocket
@@ -14,8 +16,8 @@ from support.served_live_page import answered, served
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from handover.scenarios.experiment.live_inputs import LedHand
-from handover.scenarios.live import live_page
-from handover.scenarios.live.connections import HEADERS, MessageRate, RefusalTimer
+from handover.scenarios.live import connections, live_page
+from handover.scenarios.live.connections import HEADERS, BoundedConnection, MessageRate, RefusalTimer
 from handover.scenarios.live.hand_messages import HandSample
 from handover.scenarios.live.hand_seat import HandSeat
 from handover.scenarios.live.live_page import LivePage
@@ -145,3 +147,32 @@ def test_messages_are_counted_within_the_last_second_and_two_refusals_of_a_kind_
     assert counts == [*range(1, 9), *[8] * 12]
     assert [t for t, kind in told if kind == "stamp"] == [0.0, 0.5, 1.0, 1.5, 2.0]
     assert [t for t, kind in told if kind == "p_WH"] == [0.25, 1.0, 1.75]
+
+
+def read_to_end(connection: socket.socket) -> bytes:
+    got = b""
+    with contextlib.suppress(ConnectionResetError):
+        while block := connection.recv(1 << 16):
+            got += block
+    return got
+
+
+def test_connections_that_ask_for_nothing_are_closed_and_those_beyond_the_most_at_once(
+    page: PageWithHand, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+):
+    monkeypatch.setattr(BoundedConnection, "longest_wait", 0.2)
+    monkeypatch.setattr(connections, "MOST_CONNECTIONS", 3)
+    with served(page) as (address, _), contextlib.ExitStack() as opened:
+        place = urlsplit(address)
+        assert place.hostname is not None
+        started = [b"GET / HT", b"", b"GET /no HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\nGET /"]
+        idle = [opened.enter_context(socket.create_connection((place.hostname, place.port), 10)) for _ in started]
+        for connection, text in zip(idle, started, strict=True):
+            connection.sendall(text)
+        with socket.create_connection((place.hostname, place.port), 10) as beyond:
+            assert not read_to_end(beyond)
+        assert idle[2].recv(12) == b"HTTP/1.1 404"
+        for connection in idle:
+            read_to_end(connection)
+        assert answered(address, "/")[0].status == 200
+    assert "Traceback" not in capfd.readouterr().err
