@@ -129,7 +129,10 @@ def _fault_of_model(content: bytes) -> str:
     """Return what is wrong with a model of a hand, a zip file of two TensorFlow Lite models."""
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as bundle:
-            parts = {name: bundle.read(name)[4:8] for name in MODEL_PARTS if name in bundle.namelist()}
+            there = [part for part in bundle.infolist() if part.filename in MODEL_PARTS]
+            if large := [part.filename for part in there if part.file_size > _LARGEST]:
+                return f"has a part of more than {_LARGEST // 10**6} MB: {large[0]}"
+            parts = {part.filename: bundle.read(part)[4:8] for part in there}
     except _DAMAGES as e:
         return f"is no bundle of models, a zip file: {e}"
     wrong = [name for name in MODEL_PARTS if parts.get(name) != b"TFL3"]

@@ -3,6 +3,7 @@
 import hashlib
 import json
 import socket
+import zipfile
 from collections.abc import Callable
 from html import unescape
 from itertools import pairwise
@@ -66,6 +67,14 @@ def test_what_is_not_what_its_name_says_is_refused(case: str, tmp_path: Path, wo
     with pytest.raises(InvalidWebcamFiles) as refused:
         WebcamFiles.read(folder)
     wording.check(refused.value)
+
+
+def test_a_model_that_is_packed_to_a_thousandth_is_refused_unread(tmp_path: Path):
+    folder = write_files(tmp_path / "vision")
+    with zipfile.ZipFile(folder / MODEL, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as model:
+        model.writestr(MODEL_PARTS[0], bytes(100_000_001))
+    with pytest.raises(InvalidWebcamFiles, match=f"more than 100 MB: {MODEL_PARTS[0]}"):
+        WebcamFiles.read(folder)
 
 
 @pytest.mark.parametrize(
