@@ -5,6 +5,7 @@ to resume where the command names none.
 """
 
 import contextlib
+import itertools
 import json
 import platform
 import shutil
@@ -24,6 +25,7 @@ from handover.scenarios.execution.unit_values import is_unit_value
 from handover.scenarios.experiment.parameters import text_of
 from handover.scenarios.results.folder_data import FileData, FmuData, MasterData, SourceData
 from handover.scenarios.results.run_folder import (
+    UNFINISHED,
     InvalidRunFolder,
     check_no_links,
     check_place,
@@ -229,7 +231,7 @@ class CampaignFolder:
 
     def _counts(self, entry: Path) -> bool:
         """Return whether an entry counts: a command killed before it wrote `campaign.json` leaves some that do not."""
-        return entry.name != f"{_FILE}.part" and not entry.name.startswith(".")
+        return not entry.name.startswith(".")
 
     @contextlib.contextmanager
     def _written(self, plan: CampaignPlan, fmus: Mapping[str, Path]) -> Generator[None, None, None]:
@@ -273,7 +275,9 @@ class CampaignFolder:
         return copy
 
     def _remove_unfinished(self) -> None:
-        """Remove what killed runs have left: folders beside those of runs, whose names begin with a dot."""
+        """Remove what killed commands have left: unfinished files, and folders of runs whose names begin with a dot."""
+        for file in itertools.chain(self.path.glob(UNFINISHED), self.fmus.glob(UNFINISHED)):
+            file.unlink(missing_ok=True)
         for left in self.runs.iterdir():
             if left.name.startswith("."):
                 shutil.rmtree(left, ignore_errors=True)

@@ -10,7 +10,7 @@ from imageio_ffmpeg import get_ffmpeg_exe
 
 from handover.cosim.exceptions import RecordNotWritten, one_line
 from handover.cosim.files import scratch_folder
-from handover.scenarios.results.run_folder import disk_errors_reported
+from handover.scenarios.results.run_folder import disk_errors_reported, unfinished_place
 
 CODECS: Mapping[str, Sequence[str]] = {
     ".mp4": ("-c:v", "libx264", "-crf", "18", "-pix_fmt", "yuv420p", "-movflags", "+faststart", "-f", "mp4"),
@@ -40,7 +40,7 @@ def film_to(path: Path, fps: float) -> Generator[Film, None, None]:
     Raises:
         RecordNotWritten: it cannot be written.
     """
-    suffix, unfinished = path.suffix.lower(), path.with_name(path.name + ".part")
+    suffix, unfinished = path.suffix.lower(), unfinished_place(path)
     with scratch_folder("film") as folder:
         raw = folder / "film.mkv" if suffix == ".gif" else unfinished
         try:

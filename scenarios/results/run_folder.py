@@ -12,6 +12,7 @@ import itertools
 import json
 import os
 import platform
+import secrets
 import shutil
 import time
 from collections.abc import Generator, Mapping, Sequence
@@ -281,20 +282,29 @@ def write_whole(path: Path, text: str) -> None:
         unfinished.write_text(text, encoding="utf-8")
 
 
+UNFINISHED = f".{'[0-9a-f]' * 16}.part"
+"""The pattern of `unfinished_place`, of which killed processes may leave files."""
+
+
+def unfinished_place(path: Path) -> Path:
+    """Return where a file is written before it takes its name: beside it, hidden, by a name that nothing has.
+
+    A name that could be foretold may be a file of somebody's, a link to one, or what another process is writing.
+    """
+    return path.with_name(f".{secrets.token_hex(8)}.part")
+
+
 @contextlib.contextmanager
 def replacing(path: Path) -> Generator[Path, None, None]:
     """Give the place of an unfinished file, which takes that of `path` at the end, or goes away on any error.
 
-    What is there already is removed: a link in a folder of somebody else would have another file written.
-
     Raises:
         RecordNotWritten: there is something else than a file, such as a device, or it cannot be replaced.
     """
-    unfinished = path.with_name(path.name + ".part")
+    unfinished = unfinished_place(path)
     with disk_errors_reported(path):
         if path.exists():
             check_regular(path)
-        unfinished.unlink(missing_ok=True)
     try:
         yield unfinished
         os.replace(unfinished, path)

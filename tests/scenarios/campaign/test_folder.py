@@ -16,7 +16,7 @@ from handover.cosim.stepping.options import MasterOptions
 from handover.scenarios.campaign.folder import CampaignFolder, default_folder
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.execution.errors import PoolError
-from handover.scenarios.results.run_folder import InvalidRunFolder
+from handover.scenarios.results.run_folder import InvalidRunFolder, unfinished_place
 
 PLAN = CampaignPlan(
     scenario="ir_grasp", points=[{"forward": "0.03"}, {"forward": "0.1"}], fixed={"thing": "cylinder"}, repetitions=2
@@ -148,7 +148,7 @@ def test_a_folder_of_something_else_and_a_second_command_are_refused(
 def test_a_call_killed_before_it_wrote_its_campaign_is_no_obstacle(tmp_path: Path, fmus: dict[str, Path]):
     folder = CampaignFolder(tmp_path / "c")
     folder.path.mkdir()
-    (folder.path / "campaign.json.part").write_text("{")
+    unfinished_place(folder.path / "campaign.json").write_text("{")
     begin(folder, PLAN, fmus)
     assert folder.read()["scenario"] == "ir_grasp"
 

@@ -13,7 +13,14 @@ import pytest
 from support.wording import Wording
 
 from handover.scenarios.results.run_facts import RunFacts
-from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder, dated_folder, sha256_of, versions
+from handover.scenarios.results.run_folder import (
+    InvalidRunFolder,
+    RunFolder,
+    dated_folder,
+    replacing,
+    sha256_of,
+    versions,
+)
 
 
 def test_a_folder_is_made_once_it_is_asked_for_where_there_is_nothing(tmp_path: Path):
@@ -22,6 +29,18 @@ def test_a_folder_is_made_once_it_is_asked_for_where_there_is_nothing(tmp_path: 
     folder.make()
     assert folder.figures.is_dir()
     RunFolder(folder.figures).make()  # an empty one can be used
+
+
+def test_what_is_written_takes_its_name_when_it_is_whole_beside_files_of_names_like_it(tmp_path: Path):
+    page, other = tmp_path / "page.html", tmp_path / "page.html.part"
+    other.write_text("precious")
+    with replacing(page) as slow:
+        slow.write_text("begun")
+        with replacing(page) as quick:
+            quick.write_text("of another process")
+        assert page.read_text() == "of another process"
+        slow.write_text("whole")
+    assert {p.name: p.read_text() for p in tmp_path.iterdir()} == {"page.html": "whole", "page.html.part": "precious"}
 
 
 def denied(path: Path, mode: int) -> bool:  # noqa: ARG001
