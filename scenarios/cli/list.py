@@ -53,7 +53,7 @@ from handover.scenarios.results.run_folder import check_place
     "page",
     metavar="FILE",
     type=click.Path(path_type=Path),
-    help="Write all units with icons, parameters and ports into a page that opens offline.",
+    help="Write all units with icons, parameters and ports into a page that opens offline, or replace it.",
 )
 def list_command(name: str | None, place: str | None, page: Path | None, *, as_json: bool) -> None:
     """List scenarios and units, the parameters of a SCENARIO, or parameters and ports of a UNIT.

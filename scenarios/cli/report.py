@@ -25,7 +25,11 @@ With --runs, each run of a campaign gets its page, too, to which the campaign's 
 @click.option("--figures", is_flag=True, help="Draw the figures again, too, as PNG and SVG, into DIR/figures.")
 @click.option("--runs", is_flag=True, help="Write the pages of a campaign's runs, too, into DIR/runs/NAME.")
 @click.option(
-    "--out", "file", metavar="FILE", type=click.Path(path_type=Path), help="The page.  [default: DIR/report.html]"
+    "--out",
+    "file",
+    metavar="FILE",
+    type=click.Path(path_type=Path),
+    help="The page; a file of that name is replaced.  [default: DIR/report.html]",
 )
 def report(folder: Path, figures: bool, runs: bool, file: Path | None) -> None:
     """Write the page of a run or of a campaign."""

@@ -23,7 +23,11 @@ _FOLDER = click.argument("folder", metavar="DIR", type=click.Path(path_type=Path
 @click.command("report", short_help="Write the page of a study, and all its tables.")
 @_FOLDER
 @click.option(
-    "--out", "file", metavar="FILE", type=click.Path(path_type=Path), help="The page.  [default: DIR/report.html]"
+    "--out",
+    "file",
+    metavar="FILE",
+    type=click.Path(path_type=Path),
+    help="The page; a file of that name is replaced.  [default: DIR/report.html]",
 )
 def report(folder: Path, file: Path | None) -> None:
     """Write the page of the study in DIR: one HTML file that opens offline, and its results as CSV into DIR/results.

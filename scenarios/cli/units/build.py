@@ -104,7 +104,7 @@ Environment, when a tool loads the units
     type=click.Path(path_type=Path),
     default=Path("fmus-built"),
     show_default=True,
-    help="Folder for the files.",
+    help="Folder for the files; those of the same names are replaced.",
 )
 @click.option(
     "--step",
