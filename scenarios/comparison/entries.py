@@ -5,6 +5,7 @@ Nothing is written to their folders. All faults are found at once (`NotComparabl
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
 from typing import Any, cast
@@ -78,8 +79,9 @@ class RunEntry:
 
     @cached_property
     def parameters(self) -> Mapping[str, str]:
-        """The texts of its parameters, with units where the run's folder tells them."""
-        return {name: text for name, text, _ in self.facts.parameters}
+        """The texts of its parameters, with units where the run's folder tells them; --stop is among the times."""
+        given_stop = self.metadata.get("stop") is not None
+        return {name: text for name, text, _ in self.facts.parameters if not (given_stop and name == "stop")}
 
 
 Entry = CampaignEntry | RunEntry
@@ -189,13 +191,15 @@ class Difference:
 
 
 def differences_of(entries: Sequence[Entry], varied: Sequence[str] = ()) -> list[Difference]:
-    """Return in what entries differ: parameters, units, the scenario's code, options of the master, seeds, versions.
+    """Return in what entries differ: parameters, times, files that were read, units, and what else numbers depend on.
 
     Args:
         entries: what is compared.
         varied: parameters by which points are told apart, which are left out.
     """
     found = _of_kind(entries, "parameter", lambda e: {n: t for n, t in e.parameters.items() if n not in varied})
+    found += _of_kind(entries, "times", _times)
+    found += _of_kind(entries, "file", _files)
     found += _of_kind(entries, "unit", lambda e: {n: _fmu(u) for n, u in _part(e, "units").items()})
     found += _of_kind(entries, "scenario", _code)
     found += _of_kind(entries, "master", _options)
@@ -220,6 +224,25 @@ def _fmu(unit: Any) -> str:
         return str(unit)
     known = cast(Mapping[str, Any], unit)
     return f"{known.get('fmu', '')} ({str(known.get('sha256', ''))[:12]})"
+
+
+def _times(entry: Entry) -> dict[str, str]:
+    """Return start, stop and step: of a campaign those that were asked for, of a run those that it had."""
+    asked = {name: entry.metadata.get(name) for name in ("start", "stop", "step")}
+    given: dict[str, Any] = {**asked, **_part(entry, "source"), **_part(entry, "experiment")}
+    names = {"start": "start", "stop": "stop time", "step": "communication step"}
+    known = {words: given.get(name) for name, words in names.items()}
+    return {words: f"{float(Fraction(time)):g} s" for words, time in known.items() if time is not None}
+
+
+def _files(entry: Entry) -> dict[str, str]:
+    if isinstance(entry, CampaignEntry):
+        files = _part(entry, "parameter_files")
+        return {name: _fmu({"fmu": file["file"], "sha256": file["sha256"]}) for name, file in files.items()}
+    source = _part(entry, "source")
+    if "input" not in source:
+        return {}
+    return {"inputs": _fmu({"fmu": Path(source["input"]).name, "sha256": source.get("input_sha256", "")})}
 
 
 def _code(entry: Entry) -> dict[str, str]:

@@ -24,6 +24,8 @@ from handover.scenarios.reporting.page import Section
 
 _WHAT = {
     "parameter": "parameters",
+    "times": "times",
+    "file": "files read",
     "unit": "units",
     "scenario": "scenario's code",
     "master": "master",
@@ -70,14 +72,14 @@ def campaign_outcome(entry: CampaignEntry) -> str:
 def differences_section(entries: Sequence[Entry], differences: Sequence[Difference]) -> Section:
     """Return the settings in which entries differ."""
     if not differences:
-        html = Markup("<p>Parameters, units, master and versions are the same in all.</p>")
+        html = Markup("<p>Parameters, times, files, units, master and versions are the same in all.</p>")
         return Section(anchor="differences", title="In what they differ", html=html)
     rows = [(_WHAT[d.kind], d.name.replace("_", " "), *d.values) for d in differences]
     html = rows_table(("of", "setting", *(e.name for e in entries)), rows)
     kinds = {d.kind for d in differences}
     notes: list[str] = []
-    if "unit" in kinds:
-        notes.append("A unit's FMU is named with the beginning of its SHA-256.")
+    if kinds & {"unit", "file"}:
+        notes.append("A file is named with the beginning of its SHA-256.")
     if "version" in kinds:
         notes.append("Other versions may give other numbers by themselves.")
     if notes:

@@ -174,6 +174,20 @@ def test_settings_in_which_campaigns_differ_are_listed(tmp_path: Path):
     assert [(d.name, *d.values) for d in differences_of(swept)] == [("strategy", "blind", "forward")]
 
 
+def test_other_times_and_files_are_listed(tmp_path: Path):
+    def read(digest: str) -> dict[str, dict[str, str]]:
+        return {"u.csv": {"file": "u.csv", "sha256": digest * 64}}
+
+    first = campaign(tmp_path / "a", THINGS, stop="5/2", parameter_files=read("1"))
+    second = campaign(tmp_path / "b", THINGS, step="1/100", parameter_files=read("2"))
+    campaigns, _ = read_entries([first, second])
+    assert [(d.kind, d.name, *d.values) for d in differences_of(campaigns, ["thing"])] == [
+        ("times", "stop time", "2.5 s", "–"),
+        ("times", "communication step", "–", "0.01 s"),
+        ("file", "u.csv", "u.csv (111111111111)", "u.csv (222222222222)"),
+    ]
+
+
 def test_campaigns_without_a_common_point_are_refused_with_their_values(tmp_path: Path):
     first, second = campaign(tmp_path / "a", THINGS), campaign(tmp_path / "b", [{"thing": "baby_cup_a"}])
     third = campaign(tmp_path / "c", [{}], fixed={"thing": "paper_box_a"})

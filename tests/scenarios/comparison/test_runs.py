@@ -174,3 +174,16 @@ def test_parameters_units_and_versions_that_differ_are_listed(tmp_path: Path):
         ("parameter", "k", "2", "3"),
         ("unit", "mass", "mass.fmu (111111111111)", "–"),
     ]
+
+
+def test_other_times_and_inputs_of_runs_are_listed(tmp_path: Path):
+    def source(step: str, digest: str) -> dict[str, str]:
+        return {"fmu": "x.fmu", "step": step, "input": "/in/u.csv", "input_sha256": digest * 64}
+
+    first = run(tmp_path / "a", [0.0, 1.0], {}, source=source("1/100", "1"), experiment={"start": 0.0, "stop": 1.0})
+    second = run(tmp_path / "b", [0.0, 1.0], {}, source=source("1/10", "2"), experiment={"start": 0.0, "stop": 2.0})
+    assert [(d.kind, d.name, *d.values) for d in differences_of(runs(first, second))] == [
+        ("times", "stop time", "1 s", "2 s"),
+        ("times", "communication step", "0.01 s", "0.1 s"),
+        ("file", "inputs", "u.csv (111111111111)", "u.csv (222222222222)"),
+    ]
