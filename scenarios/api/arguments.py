@@ -4,10 +4,12 @@ import enum
 import math
 import os
 import re
-from collections.abc import Generator, Mapping, Sequence, Set
+from collections.abc import Callable, Generator, Mapping, Sequence, Set
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import fields, replace
+from difflib import get_close_matches
 from fractions import Fraction
+from inspect import Parameter, signature
 from pathlib import Path
 from typing import Any, cast
 
@@ -43,8 +45,14 @@ class InvalidInput(ValueError):
 
 
 @contextmanager
-def errors_for_python() -> Generator[None, None, None]:
+def errors_for_python(
+    named: Mapping[str, Any] | None = None, function: Callable[..., Any] | None = None
+) -> Generator[None, None, None]:
     """Raise what is wrong with a call as InvalidInput, and other failures as they are.
+
+    Args:
+        named: keywords of the call that should be parameters.
+        function: what was called, for whose arguments unknown ones of them may stand.
 
     Raises:
         InvalidInput: see there. UnitFailure: a unit failed before anything ran. RecordNotWritten: the disk is full.
@@ -54,10 +62,25 @@ def errors_for_python() -> Generator[None, None, None]:
         with one_line_errors():
             yield
     except UsageError as e:
-        raise InvalidInput(_with_arguments(e.message)) from e.__cause__
+        meant = [] if function is None else _meant_arguments(e.message, named or {}, function)
+        raise InvalidInput("; ".join([_with_arguments(e.message), *meant])) from e.__cause__
     except (UnitLost, RunNotWritten, WorkersLost) as e:
         cause = e.__cause__
         raise cause if isinstance(cause, (CosimError, UnitFailure, ClusterLost)) else e from None
+
+
+_LIKE_AN_ARGUMENT = 0.7
+"""How like an argument's name, of 1, an unknown keyword is that is taken for a misspelled one."""
+
+
+def _meant_arguments(message: str, named: Mapping[str, Any], function: Callable[..., Any]) -> list[str]:
+    """Return a hint for each keyword that a message calls no parameter and that is like an argument's name."""
+    own = {p.name: p.name for p in signature(function).parameters.values() if p.kind is Parameter.KEYWORD_ONLY}
+    of_master = {f.name: f"options=handover.MasterOptions({f.name}=...)" for f in fields(MasterOptions)}
+    arguments = {**(of_master if "options" in own else {}), **own}
+    unknown = [n for n in named if re.search(f"no parameter(?: or input)? '{re.escape(n)}'", message)]
+    near = {n: get_close_matches(n, arguments, 1, _LIKE_AN_ARGUMENT) for n in unknown}
+    return [f"if {n!r} is meant as an argument, {arguments[names[0]]} is right" for n, names in near.items() if names]
 
 
 _ARGUMENTS = {

@@ -95,7 +95,7 @@ def run(
         KeyboardInterrupt: Ctrl-C, after the step under way; what was recorded until then is in the folder.
         RecordNotWritten: the disk is full.
     """
-    with errors_for_python(), contextlib.ExitStack() as opened:
+    with errors_for_python(named, run), contextlib.ExitStack() as opened:
         if report:
             require_extra("reports", "reports", "report=False")
         request = RunRequest(

@@ -363,7 +363,7 @@ def open(  # noqa: A001 (handover.open is named like it)
         InvalidInput: something of it cannot be run, with all faults and what would be right.
         UnitFailure: a unit failed as it was loaded or initialised.
     """
-    with errors_for_python(), contextlib.ExitStack() as opened:
+    with errors_for_python(named, open), contextlib.ExitStack() as opened:
         name = str(subject) if isinstance(subject, Path) else subject
         check_subject(name)
         endless = isinstance(name, System) or (isinstance(name, str) and (is_ssp(name) or is_fmu(name)))

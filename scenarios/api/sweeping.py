@@ -102,7 +102,7 @@ def sweep(
         RecordNotWritten: the disk is full. ClusterLost: all workers were lost; runs that have ended are kept.
     """
     given = merged(parameters, named)
-    with errors_for_python():
+    with errors_for_python(named, sweep):
         require_extra("campaigns", "campaigns")
         if workers is not None and scheduler is not None:
             raise InvalidInput("workers and scheduler: a scheduler has workers of its own; one of both is right")
