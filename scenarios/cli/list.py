@@ -33,7 +33,7 @@ from handover.scenarios.cli.console import open_console, print_json, print_rows
 from handover.scenarios.cli.summaries.port_tables import allowed, plain, port_rows, type_of, variable_data
 from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
 from handover.scenarios.execution.progress import doing
-from handover.scenarios.execution.selection import find_scenario
+from handover.scenarios.execution.selection import find_scenario, python_file_fault
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.places import PlacePort, ports_of_place
 from handover.scenarios.results.run_folder import check_place
@@ -104,6 +104,8 @@ def _subject(name: str | None, place: str | None) -> tuple[Callable[[], dict[str
     if ":" in name or name in SCENARIOS or name in installed_scenarios():
         scenario = find_scenario(name)
         return partial(scenario_data, scenario), partial(print_scenario, scenario)
+    if fault := python_file_fault(name, "a unit or a scenario", ["step", "build"]):
+        raise UsageError(f"{name}: {fault}")
     valid = [*SCENARIOS, *installed_scenarios(), *UNITS, *installed_units()]
     raise UsageError(f"no scenario or unit {name!r}: {nearest(name, valid)}")
 

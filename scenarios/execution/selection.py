@@ -88,7 +88,7 @@ def find_scenario(name: str) -> type[Experiment[Any]]:
                 f"{name} is a file, not a scenario: a study's plan is opened by handover study serve {name}, "
                 f"values of options by --config {name}"
             ) from None
-        if fault := _path_fault(name):
+        if fault := python_file_fault(name, "a scenario", ["build"]) or _path_fault(name):
             raise UsageError(f"{name}: {fault}") from None
         own = "" if name in "".join(valid) else "; a scenario of your own is named MODULE:CLASS"
         raise UsageError(f"no scenario {name!r}: {nearest(name, valid)}{own}") from None
@@ -147,8 +147,8 @@ def select_fmus(
     fmus: dict[str, Path] = {}
     for name, unit in experiment.units.items():
         other = others.get(name, "")
-        if file := _python_file(other):
-            raise UsageError(f"unit {name}: {other}: {_path_in(file)}")
+        if fault := python_file_fault(other):
+            raise UsageError(f"unit {name}: {other}: {fault}")
         if other and re.fullmatch(r"\w+", other) and other not in UNITS and not Path(other).exists():
             own = "; a file ends in .fmu, and a block of your own is named MODULE:CLASS"
             raise UsageError(f"unit {name}: no unit {other!r}: {nearest(other, UNITS)}{own}")
@@ -175,17 +175,26 @@ def _python_file(other: str) -> Path | None:
     return file if file.is_file() else None
 
 
-def _path_in(file: Path) -> str:
-    """Return how a block in a Python file is named."""
+def python_file_fault(name: str, what: str = "a block", methods: Sequence[str] = ("step",)) -> str:
+    """Return how what a Python file holds is named, where a name is that of such a file; else nothing.
+
+    Args:
+        name: such as `gentle.py` or `gentle`.
+        what: what is meant.
+        methods: its class has one of them: a block `step`, a scenario `build`.
+    """
+    file = _python_file(name)
+    if file is None:
+        return ""
     try:
         nodes = ast.parse(file.read_bytes()).body
     except (OSError, SyntaxError, ValueError):
         nodes = []
     classes = [node for node in nodes if isinstance(node, ast.ClassDef)]
-    blocks = [c.name for c in classes if any(isinstance(n, ast.FunctionDef) and n.name == "step" for n in c.body)]
-    named = " or ".join(f"{file.stem}:{block}" for block in blocks) or f"{file.stem}:CLASS"
+    meant = [c.name for c in classes if any(isinstance(n, ast.FunctionDef) and n.name in methods for n in c.body)]
+    named = " or ".join(f"{file.stem}:{name}" for name in meant) or f"{file.stem}:CLASS"
     folder = "" if file.parent == Path() else f", from the folder {file.parent}"
-    return f"a block in a Python file is named MODULE:CLASS: {named}{folder}"
+    return f"{what} in a Python file is named MODULE:CLASS: {named}{folder}"
 
 
 def load_units(scenario: str) -> None:

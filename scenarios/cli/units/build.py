@@ -33,6 +33,7 @@ from handover.scenarios.catalog import search_folder
 from handover.scenarios.execution.errors import UsageError, one_line_errors
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.progress import doing, say
+from handover.scenarios.execution.selection import python_file_fault
 from handover.scenarios.experiment.parameter_sets import parameter_sets
 from handover.scenarios.results.run_folder import InvalidRunFolder, check_place
 
@@ -160,6 +161,8 @@ def build_command(
     named = list(dict.fromkeys(units))
     unknown = [u for u in named if u not in UNITS and ":" not in u]
     if unknown:
+        if fault := python_file_fault(unknown[0]):
+            raise UsageError(f"{unknown[0]}: {fault}")
         remedy = "a unit of your own is named MODULE:CLASS"
         raise UsageError("; ".join(f"no unit {u!r}: {nearest(u, UNITS)}" for u in unknown) + f"; {remedy}")
     with Interruption(), one_line_errors():

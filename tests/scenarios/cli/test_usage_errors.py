@@ -61,6 +61,10 @@ run here/mas.fmu
 run here/mass
 run here/none.ssd
 run here/notes.txt
+run own_reach.py
+run own_reach
+list own_reach.py
+build own_reach.py
 run nowhere/mass
 run mass.fmuu
 run here
@@ -174,6 +178,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name in ("file", "here/mass.fmu", "here/notes.txt"):
         (place / name).touch()
     (place / "ran" / "run.json").write_text('{"scenario": "ir_grasp", "parameters": {}}')
+    code = "class Spring:\n    def step(self): ...\nclass Reach:\n    def build(self): ...\n"
+    (place / "own_reach.py").write_text(code)
     (place / "own_broken.py").write_text("x = 1\ny = 1 / 0\n")
     for name in ("a", "b"):
         folder_of(place / name, campaign_metadata("ir_grasp", [{}]), table_of([{}], moved=[0.1, 0.2]))
