@@ -27,6 +27,7 @@ from click.testing import CliRunner, Result
 from handover.scenarios.cli.command import main
 
 _LOADED = (
+    "control",
     "handover.cosim.check.load_probe",
     "handover.cosim.check.smoke_run",
     "handover.scenarios.cli.command",
