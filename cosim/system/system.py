@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, overload
 
 from handover.cosim.blocks.variable import Causality, Kind
-from handover.cosim.exceptions import WiringError
+from handover.cosim.exceptions import InvalidFmu, WiringError
 from handover.cosim.fmu.file.default_experiment import (
     NO_STEP,
     DefaultExperiment,
@@ -457,6 +457,8 @@ class System:
 
     def _described(self, path: Path) -> FmuDescription:
         if path not in self._descriptions:
+            if str(path).isidentifier() and not path.exists():
+                raise InvalidFmu(path, f"there is no such file; a unit of the catalog is handover.unit({str(path)!r})")
             self._descriptions[path] = describe_fmu(path)
         return self._descriptions[path]
 

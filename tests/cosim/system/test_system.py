@@ -68,6 +68,8 @@ def test_a_file_that_is_no_fmu_is_refused(tmp_path: Path, content: bytes | None,
     with pytest.raises(InvalidFmu) as refused:
         System().add("x", file)
     wording.check(refused.value)
+    with pytest.raises(InvalidFmu, match=r"^Push: there is no such file; .* handover.unit\('Push'\)$"):
+        System().add("x", "Push")
 
 
 @pytest.mark.parametrize("name", ["Mass", "Spring"])
