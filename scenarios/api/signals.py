@@ -76,7 +76,7 @@ class SignalTable(Mapping[str, NDArray[Any]]):
     def __repr__(self) -> str:
         """Return how many there are, and over which time."""
         duration = self.time[-1] - self.time[0] if len(self.time) else 0.0
-        return f"<{len(self)} signals over {duration:g} s, {len(self.time)} rows>"
+        return f"<{len(self)} signal{'' if len(self) == 1 else 's'} over {duration:g} s, {len(self.time)} rows>"
 
 
 def data_frame(columns: Mapping[str, Any], units: Mapping[str, str]) -> "DataFrame":
