@@ -112,10 +112,19 @@ class System:
         """Give units that have no communication step a 500th of a run's duration in seconds, to one digit."""
         if (step := presumed_step(duration)) is None:
             return
-        for name in [n for n in self._step_faults if n in self.units]:
-            self.units[name] = replace(self.units[name], period=step)
-            self._presume(name, step, "the run")
-            del self._step_faults[name]
+        for name in self.without_step:
+            self.presume_step(name, step, "a 500th of the run")
+
+    @property
+    def without_step(self) -> list[str]:
+        """Names of the units that have no communication step."""
+        return [name for name in self._step_faults if name in self.units]
+
+    def presume_step(self, name: str, step: Fraction, source: str) -> None:
+        """Give a unit that has no communication step one in seconds; a line says where that comes from."""
+        self.units[name] = replace(self.units[name], period=step)
+        self._presume(name, step, source)
+        del self._step_faults[name]
 
     @overload
     def connect(
@@ -446,14 +455,14 @@ class System:
         if period is None and (step := proposed_step(proposed.step)) is not None:
             return step
         if period is None and (step := proposed.presumed_step) is not None:
-            self._presume(name, step, "its default experiment")
+            self._presume(name, step, "a 500th of its default experiment")
             return step
         reason = proposed.step_fault or NO_STEP if period is None else f"its communication step is {period} s"
         self._step_faults[name] = NoStep(name, reason)
         return Fraction(1, 100)  # any: `check` reports the fault, but more units can be added until then
 
-    def _presume(self, name: str, step: Fraction, of: str) -> None:
-        self._presumed_steps[name] = f"{name}: {NO_STEP}; {float(step):g} s is taken, a 500th of {of}"
+    def _presume(self, name: str, step: Fraction, source: str) -> None:
+        self._presumed_steps[name] = f"{name}: {NO_STEP}; {float(step):g} s is taken, {source}"
 
     def _described(self, path: Path) -> FmuDescription:
         if path not in self._descriptions:

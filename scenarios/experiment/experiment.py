@@ -27,7 +27,7 @@ from handover.cosim.system.system import PlacedUnit, System
 from handover.scenarios.experiment.live_inputs import HandHint, LedHand, Pushable
 from handover.scenarios.experiment.paper import PublishedValue
 from handover.scenarios.experiment.pictures import CameraPicture
-from handover.scenarios.experiment.places import Place, fit_places
+from handover.scenarios.experiment.places import Place, fit_places, presume_steps_of_places
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.returned_types import (
     FILES,
@@ -260,6 +260,7 @@ class Experiment(abc.ABC, Generic[AnyEvaluator]):
             InvalidFmu: a file is not a valid co-simulation FMU.
         """
         system = self.build(parameters, seed, fmu)
+        presume_steps_of_places(system, self.units)
         fit_places(system, self.places, self.units)
         return system
 

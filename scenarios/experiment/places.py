@@ -77,6 +77,14 @@ def fit_places(system: System, places: Mapping[str, Place], units: Mapping[str, 
                 _Fitting(system, placed, place, own).fit()
 
 
+def presume_steps_of_places(system: System, units: Mapping[str, str]) -> None:
+    """Give units whose FMUs propose no step that of the scenario's own units whose places they take."""
+    for name in system.without_step:
+        if name in units:
+            own = find_unit(units[name])
+            system.presume_step(name, own.step, f"as {own.name} has it, whose place it takes")
+
+
 def _prefer_own_outputs(system: System, units: Mapping[str, str]) -> None:
     """Let outputs that the scenario's own units have, too, feed the inputs that several outputs match."""
 

@@ -1,8 +1,11 @@
 """What scenarios declare of their places is what they wire, with nothing left out, and runs as a compiled plan."""
 
+import re
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
+from support.rewritten_archive import described_otherwise
 
 from handover.cosim.master.stepper_factory import StepperFactory
 from handover.cosim.stepping.options import MasterOptions
@@ -73,3 +76,14 @@ def test_one_whose_hand_is_led_says_which_inputs_keep_it_from_that():
     reason = StepperFactory(system, MasterOptions()).plan_obstacle
     assert reason is not None
     assert reason.startswith("inputs come from outside: person.")
+
+
+def test_a_unit_whose_fmu_proposes_no_step_takes_that_of_its_place(tmp_path: Path):
+    file = tmp_path / "push.fmu"
+    described_otherwise(cached("Push", 2), file, lambda text: re.sub("<DefaultExperiment[^>]*/>", "", text))
+    scenario = SCENARIOS["flyer_impedance"]
+    others = {unit: cached(name, 2) for unit, name in scenario.units.items()}
+    system = scenario().wire(scenario.parameters_type(), 0, {**others, "push": file}.__getitem__)
+    system.check()
+    assert system.units["push"].period == find_unit("Push").step
+    assert "push: its FMU proposes no communication step; 0.016 s is taken" in "".join(system.tolerated)
