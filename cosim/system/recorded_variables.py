@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from handover.cosim.blocks.variable import Kind
-from handover.cosim.exceptions import WiringError, nearest
+from handover.cosim.exceptions import WiringError, did_you_mean, nearest
 from handover.cosim.fmu.file.description import FmuPort
 from handover.cosim.fmu.file.internal_variables import LOCAL, internal_ports
 from handover.cosim.system.port_names import PlacedUnit
@@ -69,7 +69,8 @@ def _record_named(system: System, patterns: Sequence[str], inside: _Inside) -> N
             found = found or any(is_meant(f"{name}.{output}") for output in unit.description.outputs)
         if not found:
             known = [f"{name}.{variable}" for name, unit in near.items() for variable in inside.of(unit)]
-            what = nearest(pattern, known or [f"{name}.*" for name in system.units])
+            whole = [f"{name}.{pattern}" for name, unit in system.units.items() if pattern in inside.of(unit)]
+            what = did_you_mean(whole) or nearest(pattern, known or [f"{name}.*" for name in system.units])
             faults.append(f"{pattern}: no local variable or parameter of a unit; {what}")
     if faults:
         raise WiringError(faults)

@@ -106,6 +106,8 @@ def _subject(name: str | None, place: str | None) -> tuple[Callable[[], dict[str
         return partial(scenario_data, scenario), partial(print_scenario, scenario)
     if fault := python_file_fault(name, "a unit or a scenario", ["step", "build"]):
         raise UsageError(f"{name}: {fault}")
+    if Path(name).suffix.lower() in (".fmu", ".ssp", ".ssd"):
+        raise UsageError(f"{name}: what is in a file is listed by `handover info {name}`")
     valid = [*SCENARIOS, *installed_scenarios(), *UNITS, *installed_units()]
     raise UsageError(f"no scenario or unit {name!r}: {nearest(name, valid)}")
 

@@ -92,6 +92,8 @@ run mass.fmu --seed 1
 run mass.fmu --unit a=b.fmu
 run mass.fmu --record arm.x
 run mass.fmu --record x
+run mass.fmu --record k
+list mass.fmu
 run mass.fmu --record mass.z*
 run mass.fmu --step 0
 run mass.fmu --step soon
