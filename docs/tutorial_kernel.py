@@ -18,8 +18,8 @@ from support.kept_runs import code_key
 
 from handover.cosim.native_libraries import host_platform
 
-INSTALLED_BY_READERS = ("fmpy", "pandas", "pythonfmu")
-"""Packages that tutorials say to install beside the wheel."""
+INSTALLED_BY_READERS = ("pythonfmu",)
+"""Packages that tutorials say to install beside the wheel with its extra `all`."""
 
 
 def kernel(folder: Path) -> str:
