@@ -158,7 +158,7 @@ COMMANDS = (
         help="Write the track of the hand in a handover of the free-flyer, of the run in DIR.",
     ),
     DeferredCommand(
-        "info", "handover.scenarios.cli.units.info:info", short_help="Tell what is in an FMU or an SSP, from any tool."
+        "info", "handover.scenarios.cli.units.info:info", short_help="Show what is in an FMU or an SSP, from any tool."
     ),
     DeferredCommand(
         "list",

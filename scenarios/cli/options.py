@@ -177,7 +177,7 @@ stop_option = click.option(
 log_option = click.option(
     "--log-level",
     type=click.Choice(LOG_LEVELS),
-    help="From which level on the units' logs and the master's progress are told on standard error; debug: all that"
+    help="From which level on the units' logs and the master's progress are printed on standard error; debug: all that"
     " units log.  [default: the master's warnings, and the log of a unit that fails]",
 )
 """For commands that run units; `logging_to_standard_error` takes its value."""

@@ -27,7 +27,7 @@ _HELP = """Play with the parameters of a SCENARIO in a browser, which shows its 
 
 The page has a field with a slider or a choice for each parameter, also of its units. Where one is changed, the run
 under way is ended and another one begins; verdicts of all runs stand side by side. Each is a run as of `handover run`,
-in a folder of its own, and the page tells that command; reports are written when the page asks for them.
+in a folder of its own, and the page shows that command; reports are written when the page asks for them.
 
 FILE.ssp and FILE.fmu can be played with, too: their signals are plotted, and of an FMU the inputs have fields like
 parameters, whose values they keep unless --input says others. Ctrl-C ends the session.

@@ -74,7 +74,7 @@ def replay(folder: Path, participant: str, number: int, *, check: bool) -> None:
     """Show what happened in a ROUND of a PARTICIPANT, such as P01, and write the page of its run, with the replay.
 
     With --check the round is run again with the hand's recorded inputs; exit status 1 says that a signal has not the
-    same bytes as in the record, and the first difference is told.
+    same bytes as in the record, and the first difference is named.
     """
     if check:
         _check(folder, participant, number)

@@ -19,7 +19,7 @@ from handover.scenarios.execution.fmu_run import is_fmu
 from handover.scenarios.execution.selection import folder_fault, nothing_at
 from handover.scenarios.execution.ssp_run import is_ssp
 
-_HELP = """Tell what is in FILE, an FMU (2.0 or 3.0, co-simulation) or an SSP: names, steps, capabilities, parameters,
+_HELP = """Show what is in FILE, an FMU (2.0 or 3.0, co-simulation) or an SSP: names, steps, capabilities, parameters,
 inputs, outputs and terminals; of an SSP its units, parameters and connections. Nothing is loaded or run; `handover
 check` does that.
 """
@@ -36,11 +36,11 @@ _CAPABILITIES = {
 }
 
 
-@click.command("info", help=_HELP, short_help="Tell what is in an FMU or an SSP, from any tool.")
+@click.command("info", help=_HELP, short_help="Show what is in an FMU or an SSP, from any tool.")
 @click.argument("file", type=click.Path(path_type=Path), metavar="FILE.fmu|FILE.ssp")
 @click.option("--json", "as_json", is_flag=True, help="Print it as JSON, for programs.")
 def info(file: Path, *, as_json: bool) -> None:
-    """Tell what is in an FMU or an SSP."""
+    """Show what is in an FMU or an SSP."""
     if not is_fmu(str(file)) and not is_ssp(str(file)):
         if not file.exists():
             raise UsageError(f"{file}: {nothing_at(file)}")
