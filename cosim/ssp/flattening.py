@@ -111,6 +111,7 @@ class _Flattening:
         self._fed: dict[Node, Fed] = {}
         self._values: dict[Node, SspValue] = {}
         self.flat = FlatSystem(dict(components_of(system)))
+        self._paths = set[str]()
         self._enter(system, "")
         self._values |= {node: value for node, value in asked.items() if node[0] not in descriptions}
         passed_on = {fed.source for fed in self._fed.values()}
@@ -130,6 +131,10 @@ class _Flattening:
         self._connectors |= {(path, c.name): c for c in system.connectors.values()}
         for element in system.elements.values():
             here = _join(path, element.name)
+            if here in self._paths:
+                twice = f"two elements are called {here!r}, with the systems they are in"
+                self.flat.faults.append(element.where + twice)
+            self._paths.add(here)
             if isinstance(element, SspNestedSystem):
                 self._enter(element, here)
             else:

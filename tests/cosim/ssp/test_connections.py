@@ -128,6 +128,11 @@ def test_systems_within_systems_are_taken_apart(opened: Open):
         assert wires(ssp) == {"b.y -> outer.inner.a.u": None, "outer.inner.a.y -> b.u": None}
 
 
+def test_two_elements_of_one_path_are_refused(opened: Open, wording: Wording):
+    """Of two components one would be left out without a word."""
+    wording.check(refusal(opened, component("a.b", PLAIN) + system(component("b", PLAIN), name="a")))
+
+
 def test_a_connection_or_connector_that_does_not_fit_is_refused(opened: Open, wording: Wording):
     for connections in (
         connection("c.y", "b.u"),
