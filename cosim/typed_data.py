@@ -10,6 +10,7 @@
 """
 
 from collections.abc import Iterator, Mapping
+from fractions import Fraction
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, cast, get_args
 
@@ -32,6 +33,14 @@ ExactSeconds = Annotated[str, Meta(pattern=r"^(?!0+(/|$))[0-9]{1,308}(/[1-9][0-9
 """A positive number of seconds, as `str` writes a fraction."""
 ExactTime = Annotated[str, Meta(pattern=r"^-?[0-9]{1,308}(/[1-9][0-9]{0,307})?$")]
 """A time in seconds, likewise; it may be 0 or before 0 s."""
+_MOST_EXACT = 10**308
+
+
+def is_exact_time(seconds: Fraction) -> bool:
+    """Return whether `ExactTime` takes a time: neither number of its fraction has more than 308 digits."""
+    return max(abs(seconds.numerator), seconds.denominator) < _MOST_EXACT
+
+
 NOT_BLANK = r"\S"
 Text = Annotated[str, Meta(pattern=NOT_BLANK)]
 """A text that is not empty."""

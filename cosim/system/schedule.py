@@ -137,7 +137,7 @@ class Schedule:
         It is as the unit computes it, t + dt, where that rounds to a later time.
         """
         points = self.ticks(stop)
-        steps = points // slot.every + 1 if slot in self.sampled else math.ceil(points / slot.every)
+        steps = points // slot.every + 1 if slot in self.sampled else -(-points // slot.every)
         return max(self.time(steps * slot.every), self.time((steps - 1) * slot.every) + slot.period)
 
     def _slots(self, system: System, groups: Sequence[Group]) -> tuple[Slot, ...]:

@@ -19,7 +19,7 @@ from handover.cosim.exceptions import CosimError, UnitFailure, nearest
 from handover.cosim.fmu.file.default_experiment import exact_seconds
 from handover.cosim.record.formats import RECORD_FORMATS
 from handover.cosim.stepping.options import CALL_LIMIT, Algorithm, MasterOptions
-from handover.cosim.typed_data import GREATEST_SEED
+from handover.cosim.typed_data import GREATEST_SEED, is_exact_time
 from handover.scenarios.execution.errors import (
     ClusterLost,
     RunNotWritten,
@@ -240,7 +240,16 @@ def positive_seconds(name: str, seconds: Seconds) -> Fraction:
     """
     if not 0 < _number_of(seconds) < math.inf:
         raise InvalidInput(f"{name} = {seconds!r:.60}: a finite number of seconds above 0 is right")
-    return seconds if isinstance(seconds, Fraction) else exact_seconds(float(seconds))
+    return _kept(name, seconds)
+
+
+def _kept(name: str, seconds: Seconds) -> Fraction:
+    """Return a finite number of seconds exactly, if a run's folder keeps it."""
+    exactly = seconds if isinstance(seconds, Fraction) else exact_seconds(float(seconds))
+    if not is_exact_time(exactly):
+        limits = "a number of seconds below 1e308, and not finer than 1e-307, is right"
+        raise InvalidInput(f"{name} = {float(exactly):g}: {limits}")
+    return exactly
 
 
 def exact(name: str, seconds: Seconds | None) -> Fraction | None:
@@ -254,11 +263,11 @@ def exact_time(name: str, seconds: Seconds | None) -> Fraction | None:
     Raises:
         InvalidInput: it is not a finite number.
     """
-    if seconds is None or isinstance(seconds, Fraction):
-        return seconds
+    if seconds is None:
+        return None
     if not math.isfinite(_number_of(seconds)):
         raise InvalidInput(f"{name} = {seconds!r:.60}: a finite number of seconds is right")
-    return exact_seconds(float(seconds))
+    return _kept(name, seconds)
 
 
 def whole_number(name: str, value: Any, least: int = 0) -> int:

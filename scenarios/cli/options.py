@@ -16,7 +16,7 @@ from typing import Any
 import click
 
 from handover.cosim.stepping.options import CALL_LIMIT
-from handover.cosim.typed_data import GREATEST_SEED
+from handover.cosim.typed_data import GREATEST_SEED, is_exact_time
 from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.execution.progress import LOG_LEVELS
 
@@ -84,8 +84,8 @@ class Instant(click.ParamType):  # type: ignore (generic in newer versions only)
             seconds = Fraction(digits) if _FORM.fullmatch(digits) else None
         except (ValueError, ZeroDivisionError):
             seconds = None
-        if seconds is None or seconds > sys.float_info.max:
-            self.fail(f"{value!r} is not a time in seconds, such as 0.01, 1/30 or -2", param, ctx)
+        if seconds is None or not is_exact_time(seconds):
+            self.fail(f"{value!r:.60} is not a time in seconds, such as 0.01, 1/30 or -2", param, ctx)
         return -seconds if str(value).startswith("-") else seconds
 
 
@@ -111,8 +111,8 @@ class Seconds(click.ParamType):  # type: ignore (generic in newer versions only)
             self.fail(
                 f"{value!r} is not finite as a floating-point number; seconds are such as 0.01 or 1/30", param, ctx
             )
-        if not sys.float_info.min <= seconds <= sys.float_info.max:
-            self.fail(f"{value!r} is not a positive number of seconds, such as 0.01 or 1/30", param, ctx)
+        if seconds < sys.float_info.min or not is_exact_time(seconds):
+            self.fail(f"{value!r:.60} is not a positive number of seconds, such as 0.01 or 1/30", param, ctx)
         return seconds
 
 

@@ -13,6 +13,7 @@ from handover.cosim.fmu.file.description import FmuPort
 from handover.cosim.ssp.archive import ssp_root
 from handover.cosim.ssp.ssp_file import SspFile
 from handover.cosim.ssp.xml import STRUCTURE
+from handover.cosim.typed_data import is_exact_time
 from handover.scenarios.execution import supervisor
 from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.execution.file_experiment import FileExperiment, SettableParameters, system_experiment
@@ -82,7 +83,7 @@ def checked_stop(path: Path, start: Fraction, asked: Fraction | None, proposed: 
     """Return when a run of a file ends that starts at a time, s: as asked, or as the file proposes.
 
     Raises:
-        UsageError: neither gives a time, or one that is not after the start.
+        UsageError: neither gives a time, or one that is not after the start or that a run's folder does not keep.
     """
     later = f"--stop {float(start + 10):g} lets it run from {float(start):g} to {float(start + 10):g} s"
     stop = proposed if asked is None else asked
@@ -91,6 +92,9 @@ def checked_stop(path: Path, start: Fraction, asked: Fraction | None, proposed: 
     if stop <= start:
         whose = "it proposes to stop" if asked is None else "it is to stop"
         raise UsageError(f"{path}: {whose} at {float(stop):g} s, and starts at {float(start):g} s; {later}")
+    if not (is_exact_time(start) and is_exact_time(stop)):
+        limits = "times below 1e308 s, and not finer than 1e-307 s, are taken"
+        raise UsageError(f"{path}: it runs from {float(start):g} to {float(stop):g} s; {limits}")
     return stop
 
 

@@ -4,6 +4,7 @@ Runs and checks both take the step from here, so that they propose the same one.
 """
 
 import math
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -89,6 +90,8 @@ def proposed_step(step: float | None) -> Fraction | None:
 
 def presumed_step(duration: float | Fraction) -> Fraction | None:
     """Return a 500th of a duration in seconds, to one significant digit; None where that is no step."""
+    if duration > sys.float_info.max:
+        return None
     step = Fraction(f"{float(duration) / _PARTS:.0e}")
     return step if step >= SHORTEST_STEP else None
 

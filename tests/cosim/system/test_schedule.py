@@ -148,3 +148,8 @@ def test_those_that_need_each_other_are_the_components_that_networkx_finds(needs
 
 def test_a_chain_may_be_longer_than_pythons_stack():
     assert len(strongly_connected({i: [i + 1] for i in range(20000)})) == 20000
+
+
+def test_steps_end_where_they_are_more_than_a_double_can_count():
+    schedule = Schedule(system(plain="a", period=Fraction(1, 10**4)))
+    assert schedule.end_of_steps(schedule.slots[0], Fraction(10**307)) == 1e307

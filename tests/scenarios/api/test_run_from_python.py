@@ -157,6 +157,7 @@ CALLS: dict[str, Callable[[Any], object]] = {
     "unit of FMI 4": lambda h: h.unit("Push", fmi=4),
     "unit of no names": lambda h: h.unit(":"),
     "stop beyond all numbers": lambda h: h.run("ir_grasp", stop=10**400),
+    "stop of too many digits": lambda h: h.run("ir_grasp", stop=1 + Fraction(1, 10**400)),
     "scheduler of a number": lambda h: h.sweep("ir_grasp", scheduler=3),
     "place of a number": lambda h: h.open("ir_grasp", place=3),
     "actions of a number": lambda h: h.environment("ir_grasp", "reflex", actions=3),

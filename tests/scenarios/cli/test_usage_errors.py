@@ -52,6 +52,9 @@ run ir_grasp --step 1
 run ir_grasp --start 0
 run ir_grasp --stop 0
 run ir_grasp --stop -1
+run ir_grasp --stop 1e308
+run ir_grasp --checkpoint 1e-308
+run two.ssp --stop 1e308
 run ir_grasp --input u.csv
 run ir_grasp --isolate hand
 run ir_grasp --seed 3.5
