@@ -1,7 +1,7 @@
 """The environment in which the tutorials are executed: the project's wheel, what it requires, and no clone.
 
 Packages are linked from the environment that builds the site; `handover` comes from a wheel that is built of the
-sources. It is made anew where product or packages have changed.
+sources. It is made again where product or packages have changed.
 """
 
 import json

@@ -7,10 +7,9 @@ import time
 from collections.abc import Callable, Generator
 from typing import Any
 
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
 
-from handover.scenarios.execution.progress import is_terminal
+from handover.scenarios.execution.progress import terminal_progress
 
 Move = Callable[[float, float, str], None]
 """Is called with what is done, of how much, and what that is in words."""
@@ -46,8 +45,7 @@ def _in_notebook() -> bool:
 @contextlib.contextmanager
 def _terminal_bar() -> Generator[Move, None, None]:
     columns = (TextColumn("{task.description}"), BarColumn(bar_width=30), TimeElapsedColumn())
-    console = Console(file=sys.stderr)
-    with Progress(*columns, console=console, transient=True, disable=not is_terminal(sys.stderr)) as progress:
+    with terminal_progress(sys.stderr, *columns) as progress:
         task = progress.add_task("", total=1.0)
         yield lambda done, total, text: progress.update(task, completed=done, total=total, description=text)
 

@@ -17,8 +17,7 @@ from pathlib import Path
 from types import FrameType, TracebackType
 from typing import NoReturn, TextIO
 
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn
+from rich.progress import BarColumn, TextColumn
 
 from handover.cosim.exceptions import RecordNotWritten
 from handover.scenarios.campaign.campaign import run_campaign
@@ -30,7 +29,7 @@ from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.campaign.worker_pool import RunCounts, WorkerPool
 from handover.scenarios.execution.errors import ClusterLost, RunNotWritten, UsageError, WorkersLost, one_line_errors
 from handover.scenarios.execution.exit_status import ABORTED, INTERRUPTED, UNIT_FAILED
-from handover.scenarios.execution.progress import is_terminal, say
+from handover.scenarios.execution.progress import say, terminal_progress
 from handover.scenarios.execution.supervisor import leave
 
 _PAUSE = 30.0
@@ -53,9 +52,8 @@ class CampaignProgress:
         self._stream = stream
         self._clock = clock
         self._began = self._printed_at = clock()
-        console = Console(file=stream)
         columns = (TextColumn("{task.description}"), BarColumn(bar_width=30), TextColumn("{task.fields[left]}"))
-        self._bar = Progress(*columns, console=console, transient=True, disable=not is_terminal(stream))
+        self._bar = terminal_progress(stream, *columns)
         self._task = self._bar.add_task(_STARTING, total=None, left="")
         self._printing, self._ended = threading.Lock(), threading.Event()
         self._printer = threading.Thread(target=self._print_periodically, daemon=True)

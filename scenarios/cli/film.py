@@ -8,14 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 import click
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import BarColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from handover.scenarios.campaign.folder import OF_NEITHER, CampaignFolder
 from handover.scenarios.cli.options import FiniteRange, trust_option
 from handover.scenarios.execution.errors import FilmFailed, UsageError, one_line_errors, require_extra
 from handover.scenarios.execution.interruption import Interruption
-from handover.scenarios.execution.progress import doing, is_terminal, say
+from handover.scenarios.execution.progress import doing, say, terminal_progress
 from handover.scenarios.film import LARGEST, SMALLEST
 from handover.scenarios.results.run_folder import RunFolder, check_place
 
@@ -185,8 +184,7 @@ def _progress(stream: TextIO) -> Generator[Callable[[int, int], None], None, Non
         TextColumn("left"),
         TimeRemainingColumn(),
     )
-    console = Console(file=stream)
-    with Progress(*columns, console=console, transient=True, disable=not is_terminal(stream)) as progress:
+    with terminal_progress(stream, *columns) as progress:
         task = progress.add_task("film", total=1.0)
 
         def report(done: int, of: int) -> None:

@@ -223,7 +223,11 @@ def _fmu(unit: Any) -> str:
     if not isinstance(unit, dict):
         return str(unit)
     known = cast(Mapping[str, Any], unit)
-    return f"{known.get('fmu', '')} ({str(known.get('sha256', ''))[:12]})"
+    return _with_digest(known.get("fmu", ""), known.get("sha256", ""))
+
+
+def _with_digest(name: object, sha256: object) -> str:
+    return f"{name} ({str(sha256)[:12]})"
 
 
 def _times(entry: Entry) -> dict[str, str]:
@@ -238,11 +242,11 @@ def _times(entry: Entry) -> dict[str, str]:
 def _files(entry: Entry) -> dict[str, str]:
     if isinstance(entry, CampaignEntry):
         files = _part(entry, "parameter_files")
-        return {name: _fmu({"fmu": file["file"], "sha256": file["sha256"]}) for name, file in files.items()}
+        return {name: _with_digest(file["file"], file["sha256"]) for name, file in files.items()}
     source = _part(entry, "source")
     if "input" not in source:
         return {}
-    return {"inputs": _fmu({"fmu": Path(source["input"]).name, "sha256": source.get("input_sha256", "")})}
+    return {"inputs": _with_digest(Path(source["input"]).name, source.get("input_sha256", ""))}
 
 
 def _code(entry: Entry) -> dict[str, str]:

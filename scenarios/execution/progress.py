@@ -41,8 +41,7 @@ def progress_bar(stream: TextIO) -> Generator[Callable[[float, float], None], No
         TimeElapsedColumn(),
         _Pace(),
     )
-    console = Console(file=stream)
-    with Progress(*columns, console=console, transient=True, disable=not is_terminal(stream)) as progress:
+    with terminal_progress(stream, *columns) as progress:
         task = progress.add_task("run", total=1.0, start=True)
 
         def move(t: float, end: float) -> None:
@@ -64,13 +63,18 @@ def doing(what: str) -> Generator[None, None, None]:
         yield
         return
     columns = SpinnerColumn(), TextColumn(visible(what), markup=False), TimeElapsedColumn()
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+    with terminal_progress(sys.stderr, *columns) as progress:
         progress.add_task(what, total=None)
         yield
 
 
+def terminal_progress(stream: TextIO, *columns: ProgressColumn) -> Progress:
+    """Return a bar that is shown where a stream is a terminal, and removed at the end."""
+    return Progress(*columns, console=Console(file=stream), transient=True, disable=not is_terminal(stream))
+
+
 def is_terminal(stream: TextIO) -> bool:
-    """Say whether what moves on a stream is seen. FORCE_COLOR, which notebooks set, asks for colours alone."""
+    """Return whether what moves on a stream is seen. FORCE_COLOR, which notebooks set, asks for colours alone."""
     return not stream.closed and stream.isatty()
 
 

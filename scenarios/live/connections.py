@@ -32,7 +32,7 @@ PATIENCE = 2.0
 REFUSAL_PERIOD = 0.5
 """Time between two refusals for one reason that a device is told, s: a flood is not answered with another one."""
 MOST_CONNECTIONS = 128
-"""Connections at a time: a process that has no file left for one more is told of it by Python without end."""
+"""Connections at a time: where a process has no file left for one more, asyncio logs each attempt without end."""
 BACKLOG = 32
 """Connections that are taken in at once, before any of them is counted."""
 LONGEST_WAIT = 10.0

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
-resource = pytest.importorskip("resource", reason="the CPU time of children is told on Linux and macOS only")
+resource = pytest.importorskip("resource", reason="the CPU time of children is known on Linux and macOS only")
 
 ROUNDS = 5
 CALLS: dict[str, tuple[str, ...]] = {

@@ -229,7 +229,6 @@ class Doubling(Fmi3Slave):
 @pytest.fixture(scope="module")
 def doubling(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The FMU of a class in Python, by pythonfmu3."""
-    pytest.importorskip("pythonfmu3")
     folder = tmp_path_factory.mktemp("pythonfmu3")
     source = folder / "doubling.py"
     source.write_text(_SOURCE)

@@ -17,7 +17,7 @@ from handover.scenarios.cli.summaries.campaign import campaign_data, print_campa
 from handover.scenarios.experiment.experiment import Metric
 
 
-def told(plan: CampaignPlan, rows: list[RunRow], capsys: pytest.CaptureFixture[str]) -> tuple[str, list[Any]]:
+def printed(plan: CampaignPlan, rows: list[RunRow], capsys: pytest.CaptureFixture[str]) -> tuple[str, list[Any]]:
     """Return what is printed of a campaign, and its points as data."""
     output = {"scenario": plan.scenario, "points": plan.points, "repetitions": plan.repetitions}
     results = CampaignResults(output, CampaignTable(table_of(plan, rows)))
@@ -34,7 +34,7 @@ def test_each_point_has_its_rate_with_an_interval_and_its_medians(capsys: pytest
     plan = CampaignPlan(scenario="ir_grasp", points=[{"forward": "0.03"}], repetitions=10)
     metrics = [{"final_distance_thumb": Metric(0.001 * k, "m")} for k in range(10)]
     rows = [done(run, success=run.repetition < 9, metrics=metrics[run.repetition]) for run in plan.runs()]
-    output, (point,) = told(plan, rows, capsys)
+    output, (point,) = printed(plan, rows, capsys)
     (row,) = [line.split() for line in output.splitlines() if " of 10 " in line and "runs" not in line]
     # Clopper and Pearson of 9 of 10, as in tables: 0.555 to 0.997
     assert " ".join(row) == "0.03 10 9 of 10 55 % to 100 % 4.5 mm"
@@ -47,7 +47,7 @@ def test_of_many_points_and_reasons_the_first_are_reported(capsys: pytest.Captur
     plan = CampaignPlan(scenario="ir_grasp", points=[{"forward": f"0.{n}"} for n in range(100, 200)])
     broke = "the hand broke {} times"
     rows = [RunRow(run=run, status="failed", success=None, reason=broke.format(run.point % 10)) for run in plan.runs()]
-    output, _ = told(plan, rows, capsys)
+    output, _ = printed(plan, rows, capsys)
     assert "and 88 points more" in output
     assert "10 failed: the hand broke 3 times" in output
     assert "and 5 more reasons, in the table" in output
