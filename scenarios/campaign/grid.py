@@ -123,7 +123,7 @@ def _axis_of_unit(name: str, text: str, port: FmuPort | None = None) -> tuple[li
     if is_range and declared.kind in (Kind.REAL, Kind.INTEGER):
         values, fault = _range(declared, text)
         return values, [fault] if fault else []
-    values = text.split(";" if ";" in text or declared.shape else ",")
+    values = _split(declared, text)
     if port is not None:
         values = [canonical_text(port, value) for value in values]
     faults = [f"{value} is given twice" for value in dict.fromkeys(values) if value and values.count(value) > 1]
@@ -155,7 +155,7 @@ def _axis(variable: Variable, text: str) -> tuple[list[str], list[str]]:
         if fault:
             return [], [fault]
     else:
-        values = text.split(";" if variable.shape else ",")
+        values = _split(variable, text)
     texts: dict[str, None] = {}
     faults: list[str] = []
     for value in values:
@@ -169,6 +169,11 @@ def _axis(variable: Variable, text: str) -> tuple[list[str], list[str]]:
         else:
             texts[canonical] = None
     return list(texts), list(dict.fromkeys(faults))
+
+
+def _split(variable: Declared, text: str) -> list[str]:
+    """Return the texts of single values: arrays, and texts with commas, are separated by `;`."""
+    return text.split(";" if ";" in text or variable.shape else ",")
 
 
 def _range(variable: Declared, text: str) -> tuple[list[str], str | None]:

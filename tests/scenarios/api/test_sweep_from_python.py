@@ -112,3 +112,8 @@ def test_a_file_is_swept(in_process: None, tmp_path: Path):  # noqa: ARG001
     assert [point.values["u"] for point in campaign.points] == ["1,2,3", "4,5,6"]
     assert [row["last_y[2]"] for row in campaign.rows] == [2.0, 5.0]
     assert [float(run.metrics["max_y[3]"]) for run in campaign.runs] == [3.0, 6.0]
+
+
+def test_texts_with_commas_are_single_values():
+    with pytest.raises(handover.InvalidInput, match="at waypoints=a,b.csv: .*; at waypoints=c.csv: "):
+        handover.sweep("vsl_hybrid", path="custom", waypoints=["a,b.csv", "c.csv"])

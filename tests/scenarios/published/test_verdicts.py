@@ -52,6 +52,7 @@ rare = partial(rare_claim, "It does not touch.", "sec. I", "")
         (rate((60, 80)), REPRODUCED),
         (rate((80, 80)), NOT_REPRODUCED),
         (rate((20, 80)), NOT_REPRODUCED),
+        (rate((0, 80)), NOT_REPRODUCED),
         (rate((0, 0)), NOT_COMPARABLE),
         (rate_claim("It holds 2 of 3.", "table I", (2, 3), (3, 3)), NOT_COMPARABLE),
         (order(of(6, 10), of(0, 10)), REPRODUCED),
@@ -66,6 +67,7 @@ rare = partial(rare_claim, "It does not touch.", "sec. I", "")
         (no_worse(of(40, 40), of(0, 40)), REPRODUCED),  # runs in which only the first succeeds do not count against it
         (most((60, 80)), REPRODUCED),
         (most((45, 80)), NOT_REPRODUCED),
+        (most((0, 80)), NOT_REPRODUCED),
         (most((5, 5)), NOT_COMPARABLE),
         (rare((0, 80)), REPRODUCED),
         (rare((4, 80)), NOT_REPRODUCED),
