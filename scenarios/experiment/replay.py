@@ -126,7 +126,7 @@ def faceted(mesh: Mesh) -> Mesh:
 
 _POINTS = Expected(
     "an array of shape (rows, n, 3), or (1, n, 3)",
-    'record["arm.p_WE"][:, None, :]',
+    'record["arm.p_WG"][:, None, :]',
     lambda points: is_series(points, (None, None, 3)),
 )
 _RADII = Expected("an array of shape (n,), or None", "np.full(3, 0.01)", lambda r: r is None or is_series(r, (None,)))

@@ -23,7 +23,7 @@ Stroke = Literal["solid", "dashed", "dotted"]
 
 SERIES = Expected(
     "an array of numbers of shape (rows,), one a row of the record",
-    'record["arm.p_WE"][:, 0]',
+    'record["arm.p_WG"][:, 0]',
     lambda values: is_series(values, (None,)),
 )
 
@@ -66,7 +66,7 @@ class Phase(Checked):
     name: str
 
 
-_CURVES = sequence_of(Curve, '[Curve(label="x", values=record["arm.p_WE"][:, 0])]')
+_CURVES = sequence_of(Curve, '[Curve(label="x", values=record["arm.p_WG"][:, 0])]')
 _LEVELS = sequence_of(Level, '[Level(label="threshold", value=0.005)]')
 _LIMITS = Expected(
     "a lower and an upper limit, each a number or None",

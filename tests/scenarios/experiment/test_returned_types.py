@@ -133,7 +133,7 @@ def test_what_they_return_is_checked_where_it_is_made(make: Any):
 
 
 def test_the_examples_are_of_the_types_that_they_stand_for():
-    record = {"arm.p_WE": np.zeros((3, 3)), "robot.p_WB": np.zeros((3, 3)), "robot.q_WB": np.zeros((3, 4))}
+    record = {"arm.p_WG": np.zeros((3, 3)), "robot.p_WB": np.zeros((3, 3)), "robot.q_WB": np.zeros((3, 4))}
     known = {name: value for module in (experiment, replay, time_plot, catalog) for name, value in vars(module).items()}
     known |= {"np": np, "p": np.zeros(3), "record": record, "points": np.zeros((3, 2, 3))}
     expected: list[Any] = []

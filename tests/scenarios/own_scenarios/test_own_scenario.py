@@ -24,7 +24,7 @@ def test_it_runs_and_its_report_is_written_again_from_elsewhere(here: Path, tmp_
     assert "two_link_reach succeeded" in printed
     assert "from the tip to the goal" in printed  # its metric, with no headline declared
     record = Record(here / "first" / "signals.parquet")
-    assert np.linalg.norm(record["arm.p_WE"][-1] - [0.4, 0.3]) < 0.005
+    assert np.linalg.norm(record["arm.p_WG"][-1] - [0.4, 0.3]) < 0.005
     assert f"--trust {here / 'reach.py'}" in call(tmp_path, "report", str(here / "first")).errors
     succeeded(tmp_path, "report", str(here / "first"), "--figures", "--trust", str(here / "reach.py"))
     page = (here / "first" / "report.html").read_text(encoding="utf-8")
@@ -41,7 +41,7 @@ def test_list_prints_scenario_controller_and_plant(here: Path):
     printed = succeeded(here, "list", SCENE)
     assert "An arm of two links reaches for a point" in printed
     assert "where the tip is to come, in W" in printed
-    assert "SpringToGoal: tau = J^T k (p_WG - p_WE) - d v" in succeeded(here, "list", "goal_spring:SpringToGoal")
+    assert "SpringToGoal: tau = J^T k (p_WD - p_WG) - d v" in succeeded(here, "list", "goal_spring:SpringToGoal")
 
 
 @pytest.mark.slow

@@ -26,7 +26,7 @@ def test_a_controller_without_the_optional_ports_runs_and_what_is_left_out_or_no
     assert done.status == 1, done.errors  # it moves, and not to where the scenario has its goal
     note = (
         "unit controller (Joints) has no output energy: what the scenario would make of it is left out; "
-        "no parameter p_WG: what the scenario would set it to is not used"
+        "no parameter p_WD: what the scenario would set it to is not used"
     )
     assert done.errors.count(note) == 1
     assert json.loads((here / "run" / "run.json").read_text())["notes"] == [note]

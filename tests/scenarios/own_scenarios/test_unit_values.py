@@ -18,12 +18,12 @@ def torque(run: Path) -> "np.ndarray[tuple[int, ...], np.dtype[np.float64]]":
 
 
 def test_a_run_takes_a_value_and_keeps_it_and_an_export_binds_it(here: Path):
-    weak = ["-p", "controller.stiffness=10", "-p", "controller.p_WG=0.3,0.6", "-p", "arm.mass=3"]
+    weak = ["-p", "controller.stiffness=10", "-p", "controller.p_WD=0.3,0.6", "-p", "arm.mass=3"]
     ran(here, "run", SCENE, *QUIET, "--out", "stiff")
     ran(here, "run", SCENE, *QUIET, *weak, "--out", "weak")
     np.testing.assert_allclose(torque(here / "weak"), 0.5 * torque(here / "stiff"), rtol=1e-12)
     kept = json.loads((here / "weak" / "run.json").read_text())
-    assert kept["unit_values"] == {"controller.stiffness": "10", "controller.p_WG": "0.3,0.6", "arm.mass": "3"}
+    assert kept["unit_values"] == {"controller.stiffness": "10", "controller.p_WD": "0.3,0.6", "arm.mass": "3"}
     assert ["arm.mass", "3", "given value of the unit's parameter"] in kept["told_parameters"]
     assert "unit_values" not in json.loads((here / "stiff" / "run.json").read_text())
     succeeded(here, "export", SCENE, "-p", "controller.stiffness=10", "--ssp", "weak.ssp")

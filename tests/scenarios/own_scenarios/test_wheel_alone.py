@@ -105,7 +105,7 @@ def test_without_extras_it_runs_and_what_lacks_is_named(
 def test_a_run_has_its_record_and_a_page_with_a_replay_and_so_has_its_ssp(own: Installation):
     assert "two_link_reach succeeded" in own.succeeded("run", SCENE, "--out", "first")
     signals = own.here / "first" / "signals.parquet"
-    assert np.linalg.norm(Record(signals)["arm.p_WE"][-1] - [0.3, 0.6]) < 0.005
+    assert np.linalg.norm(Record(signals)["arm.p_WG"][-1] - [0.3, 0.6]) < 0.005
     assert signals.read_bytes() == (own.here / "without_extras" / "signals.parquet").read_bytes()
     assert '<section id="replay">' in (own.here / "first" / "report.html").read_text(encoding="utf-8")
     assert (own.here / "first" / "figures" / "distance.png").is_file()

@@ -57,7 +57,7 @@ class Joints(Stateless):
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:
         return self.outputs(t, u)
 """
-"""A controller that has its goal in itself: it has no p_WG."""
+"""A controller that has its goal in itself: it has no p_WD."""
 
 MISSPELLED = """
 @dataclass(kw_only=True)
@@ -143,7 +143,7 @@ class Placed(TwoLinkReach):
     places = {
         "controller": Place(
             required={"tau": "positive turns left, as seen from above"},
-            optional={"q": "", "v": "", "p_WG": "the scenario's goal, in W", "energy": "shown"},
+            optional={"q": "", "v": "", "p_WD": "the scenario's goal, in W", "energy": "shown"},
             remarks=("W has its origin at the shoulder.",),
         )
     }
