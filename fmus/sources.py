@@ -1,6 +1,7 @@
-"""Which modules an FMU must contain to run its block, and which packages it needs from its environment.
+"""Which modules and data an FMU must contain to run its block, and which packages it needs from its environment.
 
-They are found by following the import statements in the sources, without running them.
+They are found by following the import statements in the sources, without running them. Data are what a module names as
+`Path(__file__).with_name("NAME")`, a file or a folder of files.
 """
 
 import ast
@@ -32,6 +33,7 @@ SLAVE_SIDE = (
 """Modules that every FMU contains, whatever its block imports."""
 
 
+_DATA = re.compile(rb"""Path\(__file__\)\.with_name\(["']([\w.-]+)["']\)""")
 _PATH_OF_CLASS = re.compile(r"[^\W\d][\w.]*:\w+")
 
 
@@ -46,10 +48,10 @@ class Package:
 
 @dataclass(frozen=True)
 class Carried:
-    """The Python code of an FMU.
+    """The Python code of an FMU, and its data.
 
     Attributes:
-        files: sources by their paths in the FMU, such as `handover/plants/helix/arm/tendon_arm.py`.
+        files: by their paths in the FMU, such as `handover/plants/helix/arm/tendon_arm.py`.
         imported: names that they import from the environment's packages, sorted: modules, and what is in them.
     """
 
@@ -87,7 +89,7 @@ def _top_levels(distribution: metadata.Distribution) -> set[str]:
 
 
 def closure(block: str) -> Carried:
-    """Return the sources and packages that a block's module imports, directly or through others.
+    """Return the sources and packages that a block's module imports, directly or through others, and their data.
 
     Args:
         block: path of the block's class, such as `handover.plants.helix.arm.tendon_arm:TendonArm`.
@@ -101,6 +103,7 @@ def closure(block: str) -> Carried:
     source_file(block)
     carried_tops = {OWN_PACKAGE, module.partition(".")[0]}
     files: dict[str, Path] = {}
+    data: dict[str, Path] = {}
     imported: set[str] = set()
     waiting = [module, *SLAVE_SIDE]
     while waiting:
@@ -118,10 +121,19 @@ def closure(block: str) -> Carried:
             path = _path_in_fmu(part, spec)
             if _is_source(spec) and path not in files:
                 files[path] = Path(spec.origin or "")
+                data |= _data_of(path, files[path])
                 is_package = spec.submodule_search_locations is not None
                 package = part if is_package else part.rpartition(".")[0]
                 waiting += _imports(files[path].read_bytes(), package, str(files[path]))
-    return Carried(dict(sorted(files.items())), tuple(sorted(imported)))
+    return Carried(dict(sorted({**files, **data}.items())), tuple(sorted(imported)))
+
+
+def _data_of(path: str, source: Path) -> dict[str, Path]:
+    """Return the data files that a module names beside it, by their paths in the FMU."""
+    named = (source.with_name(name.decode()) for name in _DATA.findall(source.read_bytes()))
+    files = (file for data in named for file in (data.rglob("*") if data.is_dir() else [data]) if file.is_file())
+    folder = path.rpartition("/")[0]
+    return {f"{folder}/{file.relative_to(source.parent).as_posix()}".lstrip("/"): file for file in files}
 
 
 class FileElsewhere(ValueError):
@@ -162,7 +174,8 @@ def carried_digest(path: str) -> str:
     while waiting:
         seen.add(block := waiting.pop())
         own = {n: f for n, f in closure(block).files.items() if n.partition("/")[0] != OWN_PACKAGE}
-        named = (name for n in own.keys() - files.keys() for name in _named_classes(own[n].read_bytes(), str(own[n])))
+        sources = (n for n in own.keys() - files.keys() if n.endswith(".py"))
+        named = (name for n in sources for name in _named_classes(own[n].read_bytes(), str(own[n])))
         waiting += [name for name in named if name not in seen and _is_own(name)]
         files |= own
     digest = hashlib.sha256()

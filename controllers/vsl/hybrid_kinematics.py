@@ -9,7 +9,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from handover.controllers.vsl import default_friction_model, default_model, default_physics_model, default_small_model
 from handover.controllers.vsl.feedback import (
     CurrentFilter,
     ImuTip,
@@ -20,7 +19,7 @@ from handover.controllers.vsl.feedback import (
 )
 from handover.controllers.vsl.kinematics import Elbow, VslKinematics
 from handover.controllers.vsl.learned_model import Learned, VslModel
-from handover.controllers.vsl.model_text import InvalidModel, parse_model, read_model
+from handover.controllers.vsl.model_text import InvalidModel, read_model
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.ports import Floats, Vector2, Vector3, output, parameter, port
 from handover.cosim.blocks.start_values import parameter_faults
@@ -41,13 +40,19 @@ __all__ = [
     "UnusedParameters",
 ]
 
+MODELS = Path(__file__).with_name("models")
+"""Folder of the models that ship."""
+
 _SHIPPED = {
-    (Learned.CUBIC, False): default_model.DEFAULT_MODEL,
-    (Learned.CUBIC, True): default_friction_model.DEFAULT_MODEL,
-    (Learned.SMALL, False): default_small_model.DEFAULT_MODEL,
-    (Learned.PHYSICS, False): default_physics_model.DEFAULT_MODEL,
+    (Learned.CUBIC, False): "cubic",
+    (Learned.CUBIC, True): "friction",
+    (Learned.SMALL, False): "small",
+    (Learned.PHYSICS, False): "physics",
 }
-"""Texts of the models that ship, by what they are and whether they were trained on currents without friction."""
+"""Names of the models that ship, by what they are and whether they were trained on currents without friction.
+
+Each was written by `train_command` with `--points 1500 --seed 0 --out controllers/vsl/models/NAME.json`.
+"""
 
 
 _PERIOD = Fraction(1, 50)  # s
@@ -353,8 +358,8 @@ def _model(p: Params, kinematics: VslKinematics) -> VslModel:
     source = p.model or f"{kind}{' with friction compensation' if p.friction_compensation else ''}, as it ships"
     if p.model:
         model = read_model(Path(p.model))
-    elif text := _SHIPPED.get((p.learned, p.friction_compensation)):
-        model = parse_model(text, source)
+    elif name := _SHIPPED.get((p.learned, p.friction_compensation)):
+        model = read_model(MODELS / f"{name}.json")
     else:
         raise InvalidModel(source, "there is none: train one and name its file by the parameter model", remedy)
     if model.kind is not p.learned:

@@ -73,18 +73,17 @@ def write_data(path: Path, measured: Measured) -> None:
     pq.write_table(table.replace_schema_metadata(metadata), path)
 
 
-def read_data(path: Path, key: str, kinematics: VslKinematics, parameters: Mapping[str, Any] | None = None) -> Measured:
+def read_data(path: Path, kinematics: VslKinematics, parameters: Mapping[str, Any] | None = None) -> Measured:
     """Read points of an arm.
 
     Args:
         path: Parquet file.
-        key: hash of the arm's sources, see `content_key`.
         kinematics: of rigid links, by which the arm was commanded.
         parameters: of the arm, as plain data; None: of any.
 
     Raises:
         InvalidData: it cannot be read, is no Parquet file, lacks columns, has numbers that are not finite or, by their
-            size, not in SI units, or is of another arm, other parameters of it, or other links.
+            size, not in SI units, or is of an arm with other parameters or links.
     """
     try:
         table: Any = read_parquet(path)
@@ -96,7 +95,7 @@ def read_data(path: Path, key: str, kinematics: VslKinematics, parameters: Mappi
     if missing := [name for name in wanted if name not in table.column_names]:
         raise InvalidData(path, f"it lacks the columns {', '.join(missing)}")
     origin = _origin(path, table.schema.metadata or {})
-    _check_arm(path, origin, key, kinematics)
+    _check_links(path, origin, kinematics)
     if parameters is not None:
         _check_parameters(path, origin["arm"], parameters)
     numbers = {name: _numbers(path, table, name) for name in wanted}
@@ -134,12 +133,7 @@ def _origin(path: Path, metadata: Mapping[bytes, bytes]) -> dict[str, Any]:
     return content
 
 
-def _check_arm(path: Path, origin: Mapping[str, Any], key: str, kinematics: VslKinematics) -> None:
-    stated = origin["arm"].get("key")
-    if stated != key:
-        raise InvalidData(
-            path, f"it was measured on another arm: the hash of its sources is {str(stated)[:12]}, not {key[:12]}"
-        )
+def _check_links(path: Path, origin: Mapping[str, Any], kinematics: VslKinematics) -> None:
     links = links_of(kinematics)
     if dict(origin["links"]) != links:
         raise InvalidData(path, f"it was measured with links of {_text(origin['links'])}, not {_text(links)}")

@@ -26,7 +26,6 @@ from handover.controllers.vsl.learned_model import (
 )
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.vsl.data_file import links_of
-from handover.scenarios.vsl.model_file import content_key
 from handover.scenarios.vsl.residuals import Errors, Pairs, Residuals, lengths_of
 from handover.scenarios.vsl.training_data import (
     Dataset,
@@ -128,7 +127,7 @@ class VslTraining:
         usable = self._usable(data)
         order = np.full(len(data), -1)
         order[usable[rng.permutation(len(usable))]] = np.arange(len(usable))
-        arm = {"fmu": d.name, "key": content_key(self.fmu), "parameters": plain_parameters(d, parameters)}
+        arm = {"fmu": d.name, "parameters": plain_parameters(d, parameters)}
         origin = {"arm": arm, "links": links_of(self.kinematics), "seed": self.seed, "walk": self.walk}
         return Measured(data, order, origin)
 

@@ -102,7 +102,7 @@ class Measured:
         points: all of them.
         order: the place of each in the split, shape (n,): training points first, then validation and test; -1 where the
             tip is too near to the limits of reach.
-        origin: plain data: `arm` (name, key and parameters of its FMU), `links` that commanded it, `seed` and `walk`.
+        origin: plain data: `arm` (name and parameters of its FMU), `links` that commanded it, `seed` and `walk`.
     """
 
     points: Dataset

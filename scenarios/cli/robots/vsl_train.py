@@ -16,7 +16,7 @@ from handover.controllers.vsl.fit_network import EPOCHS, NoPyTorch, torch_or_ref
 from handover.controllers.vsl.hybrid_kinematics import LENGTHS, Params
 from handover.controllers.vsl.kinematics import Elbow, Unreachable, VslKinematics
 from handover.controllers.vsl.learned_model import ForwardInput, Learned, VslModel
-from handover.controllers.vsl.model_text import InvalidModel, read_model
+from handover.controllers.vsl.model_text import InvalidModel, model_text, read_model
 from handover.cosim.blocks.start_values import fault_of
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import CosimError, UnitFailure, nearest
@@ -30,7 +30,6 @@ from handover.scenarios.execution.progress import progress_bar
 from handover.scenarios.results.run_folder import InvalidRunFolder, check_place, make_folder_of, replacing, write_whole
 from handover.scenarios.vsl.data_file import InvalidData, read_data, write_data
 from handover.scenarios.vsl.learning_curve import curve_table, draw_curve, learning_curve
-from handover.scenarios.vsl.model_file import content_key, file_text
 from handover.scenarios.vsl.residuals import Errors
 from handover.scenarios.vsl.training import MIN_POINTS, NothingToLearn, Progress, VslTraining
 from handover.scenarios.vsl.training_data import LEAST_SPAN, RADII, Measured, describe_arm, measured_reach
@@ -102,8 +101,7 @@ def vsl_train(context: click.Context, **given: Any) -> None:
 
     Measures points at random pressures, joint angles and loads, fits what rigid kinematics leave, and prints the errors
     of points that were set aside. The model is a parameter of HybridKinematics: `-p model=FILE` of vsl_hybrid, with
-    -p learned and -p friction_compensation as it was trained. An --out that ends in .py gets the form of
-    controllers/vsl/default_model.py.
+    -p learned and -p friction_compensation as it was trained.
 
     The published network is trained by PyTorch: `pip install "handover-cosim[train]"`.
 
@@ -144,11 +142,11 @@ class _Options:
 
     def check(self, typed: set[str]) -> None:
         """Raise UsageError for files that could not be written, and for options that contradict each other."""
-        _check_file("--out", self.out, (".json", ".py"), "or in .py for the module form")
+        _check_file("--out", self.out, ".json")
         if self.save_data:
-            _check_file("--save-data", self.save_data, (".parquet",))
+            _check_file("--save-data", self.save_data, ".parquet")
         if self.curve:
-            _check_file("--curve", self.curve, (".png",))
+            _check_file("--curve", self.curve, ".png")
         if self.adapt and (
             idle := typed & {"learned", "forward_input", "friction_compensation", "epochs", "curve", "elbow"}
         ):
@@ -190,7 +188,7 @@ class _Options:
         """Return points from the file, or as the arm measures them, which are then saved if wanted."""
         if self.data:
             parameters = None if self.adapt else training.parameters()
-            measured = read_data(self.data, content_key(training.fmu), training.kinematics, parameters)
+            measured = read_data(self.data, training.kinematics, parameters)
             try:
                 training.check(measured)
             except NothingToLearn as e:
@@ -214,7 +212,7 @@ class _Options:
             except OSError as e:
                 raise UsageError(f"--save-data {self.save_data}: {e.strerror or e}") from e
         make_folder_of(self.out)
-        write_whole(self.out, file_text(model, self.out))
+        write_whole(self.out, model_text(model))
 
 
 def _train(o: _Options, progress: Progress) -> list[str]:
@@ -370,10 +368,10 @@ def _built() -> Path:
         raise UsageError(f"the folder of built units cannot be used (HANDOVER_CACHE): {e}") from e
 
 
-def _check_file(option: str, out: Path, suffixes: tuple[str, ...], more: str = "") -> None:
+def _check_file(option: str, out: Path, suffix: str) -> None:
     longest = 240  # of the 255 bytes of a file's name; the unfinished file's name is longer
-    if out.suffix not in suffixes:
-        raise UsageError(f"{option} {out}: a name that ends in {suffixes[0]}{', ' + more if more else ''}")
+    if out.suffix != suffix:
+        raise UsageError(f"{option} {out}: a name that ends in {suffix}")
     if len(os.fsencode(out.name)) > longest:
         raise UsageError(f"{option} {out}: the name is longer than {longest} bytes")
     if out.is_dir():

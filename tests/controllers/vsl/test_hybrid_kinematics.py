@@ -1,4 +1,5 @@
 import math
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -8,9 +9,8 @@ import pytest
 from support.restored_states import assert_continues, assert_outputs_change_nothing
 from support.wording import Wording
 
-from handover.controllers.vsl import default_friction_model, default_physics_model, default_small_model
-from handover.controllers.vsl.default_model import DEFAULT_MODEL
 from handover.controllers.vsl.hybrid_kinematics import (
+    MODELS,
     Elbow,
     HybridKinematics,
     Imu,
@@ -24,10 +24,10 @@ from handover.controllers.vsl.hybrid_kinematics import (
 )
 from handover.controllers.vsl.kinematics import VslKinematics
 from handover.controllers.vsl.learned_model import Cubic
-from handover.controllers.vsl.model_text import model_text, parse_model
+from handover.controllers.vsl.model_text import model_text, read_model
 
 ARM = VslKinematics(0.15, 0.225, 0.225, Elbow.UP)
-MODEL = parse_model(DEFAULT_MODEL, "that ships")
+MODEL = read_model(MODELS / "cubic.json")
 Q = ARM.inverse(np.array([0.35, 0.0, 0.15]))
 USUAL = Inputs(
     q_ref=Q,
@@ -39,9 +39,9 @@ USUAL = Inputs(
 RIGID = Params(method=Method.MODEL_BASED)
 ESTIMATE = Params(method=Method.ESTIMATE)
 SHIPPED = {
-    Learned.CUBIC: DEFAULT_MODEL,
-    Learned.SMALL: default_small_model.DEFAULT_MODEL,
-    Learned.PHYSICS: default_physics_model.DEFAULT_MODEL,
+    Learned.CUBIC: MODEL,
+    Learned.SMALL: read_model(MODELS / "small.json"),
+    Learned.PHYSICS: read_model(MODELS / "physics.json"),
 }
 ALL = [
     RIGID,
@@ -73,7 +73,7 @@ def test_rigid_kinematics_pass_angles_on_and_estimate_where_the_tip_would_be():
 
 @pytest.mark.parametrize("learned", SHIPPED)
 def test_each_of_those_that_ship_is_behind_the_same_ports(learned: Learned):
-    model = parse_model(SHIPPED[learned], "that ships")
+    model = SHIPPED[learned]
     assert model.kind is learned
     y = HybridKinematics(Params(learned=learned)).step(0.0, 0.02, USUAL)
     np.testing.assert_array_equal(y.q_cmd, model.command(USUAL.q_ref, USUAL.p_meas, USUAL.i_meas))
@@ -112,7 +112,7 @@ def test_the_closed_loop_raises_a_tip_that_is_too_low(method: Method):
 
 def test_friction_compensation_forgets_no_turn():
     """Of an arm whose currents carry friction by the direction of its commands, the currents are seen without."""
-    frictionless = parse_model(default_friction_model.DEFAULT_MODEL, "that ships")
+    frictionless = read_model(MODELS / "friction.json")
     unit = HybridKinematics(Params(friction_compensation=True, i_lag=0.0))
     for k in range(10):
         q = USUAL.q_ref + 0.01 * k * np.array([0.0, 1.0, -1.0])
@@ -178,7 +178,7 @@ def test_a_restored_state_goes_on_bit_for_bit_and_outputs_take_no_time(params: P
 
 
 def test_a_model_is_read_from_a_file(tmp_path: Path):
-    shipped = parse_model(DEFAULT_MODEL, "that ships")
+    shipped = MODEL
     assert isinstance(shipped.inverse, Cubic)
     constant = np.zeros_like(shipped.inverse.coefficients)
     constant[0] = 0.25
@@ -192,8 +192,8 @@ def test_a_model_that_is_not_what_the_parameters_say_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wording: Wording
 ):
     monkeypatch.chdir(tmp_path)
-    Path("cubic").write_text(DEFAULT_MODEL)
-    Path("frictionless").write_text(default_friction_model.DEFAULT_MODEL)
+    shutil.copyfile(MODELS / "cubic.json", "cubic")
+    shutil.copyfile(MODELS / "friction.json", "frictionless")
     for params in (
         Params(learned=Learned.PUBLISHED),
         Params(learned=Learned.SMALL, friction_compensation=True),

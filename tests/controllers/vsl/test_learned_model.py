@@ -13,9 +13,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from support.wording import Wording
 
-from handover.controllers.vsl import default_friction_model, default_model, default_physics_model, default_small_model
-from handover.controllers.vsl.default_model import DEFAULT_MODEL
 from handover.controllers.vsl.fit import fit_adapted, fit_cubic, fit_friction
+from handover.controllers.vsl.hybrid_kinematics import MODELS
 from handover.controllers.vsl.kinematics import Elbow, VslKinematics
 from handover.controllers.vsl.learned_model import (
     Cubic,
@@ -51,8 +50,8 @@ def model() -> VslModel:
     return VslModel(fit.cubic, fit.cubic, VslKinematics(0.15, 0.225, 0.225, Elbow.UP), {"seed": 1})
 
 
-SHIPPED = [m.DEFAULT_MODEL for m in (default_model, default_small_model, default_physics_model, default_friction_model)]
 KINDS = ["cubic", "small", "physics", "friction"]
+SHIPPED = [(MODELS / f"{kind}.json").read_text() for kind in KINDS]
 
 
 def slopes(f: Callable[[Floats], Floats], at: Floats, step: float) -> Floats:
@@ -128,7 +127,7 @@ def test_the_corrected_jacobian_is_the_derivative_of_the_tip(text: str):
 
 
 def test_a_published_model_gives_angles_and_position_themselves():
-    cubic, m = parse_model(DEFAULT_MODEL, "that ships").forward, model()
+    cubic, m = read_model(MODELS / "cubic.json").forward, model()
     assert isinstance(cubic, Cubic)
     by_X = Cubic(np.array([0.3, 0.0, 0.15, *cubic.mean[3:]]), cubic.scale, cubic.hull, cubic.powers, cubic.coefficients)
     q, p, i = np.array([0.3, 0.6, -1.2]), np.array([0.9e5, 1.2e5]), np.array([0.0, 0.7, 0.15])

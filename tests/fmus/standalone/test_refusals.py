@@ -36,7 +36,7 @@ def reader(folder: Path, name: str, place: str) -> str:
     return write_block(folder, name, f"float(__import__('pathlib').{place}.read_text())", f"{name}_helper")
 
 
-BESIDE = "Path(__file__).with_name('table.csv')"
+BESIDE = "Path(__file__).parent.joinpath('table.csv')"
 
 
 def refused(*given: str) -> str:
@@ -84,16 +84,23 @@ def test_without_pyinstaller(monkeypatch: pytest.MonkeyPatch):
 
 
 def test_a_file_beside_the_module_goes_along_and_others_are_refused(folder: Path, tmp_path: Path):
-    block = reader(folder, "reads_beside", BESIDE)
+    named, block = (
+        reader(folder, module, place)
+        for module, place in (("names_it", "Path(__file__).with_name('table.csv')"), ("reads_beside", BESIDE))
+    )
     elsewhere = tmp_path / "elsewhere.csv"
     elsewhere.write_text("1\n")
     for file in (elsewhere, folder / "nothing.csv"):
         with pytest.raises(FileElsewhere, match="the folder of the block's module"):
             build(own_unit(block, None), 3, tmp_path, include=[file])
-    fmu = build(own_unit(block, None), 3, tmp_path, include=[folder / "table.csv"])
+    fmus = [
+        build(own_unit(named, None), 3, tmp_path / "named"),
+        build(own_unit(block, None), 3, tmp_path, include=[folder / "table.csv"]),
+    ]
     (folder / "table.csv").write_text("no number\n")
-    result: Any = fmpy.simulate_fmu(str(fmu), stop_time=0.1, output=["y"])  # type: ignore
-    assert result["y"][-1] == 2.5
+    for fmu in fmus:
+        result: Any = fmpy.simulate_fmu(str(fmu), stop_time=0.1, output=["y"])  # type: ignore
+        assert result["y"][-1] == 2.5
 
 
 @pytest.mark.usefixtures("compiles_nothing")

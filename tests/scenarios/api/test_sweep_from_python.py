@@ -115,5 +115,5 @@ def test_a_file_is_swept(in_process: None, tmp_path: Path):  # noqa: ARG001
 
 
 def test_texts_with_commas_are_single_values():
-    with pytest.raises(handover.InvalidInput, match="at waypoints=a,b.csv: .*; at waypoints=c.csv: "):
+    with pytest.raises(handover.InvalidInput, match=r"at waypoints=a,b\.csv: .*; at waypoints=c\.csv: "):
         handover.sweep("vsl_hybrid", path="custom", waypoints=["a,b.csv", "c.csv"])

@@ -3,9 +3,9 @@
 import errno
 import os
 import re
+import shutil
 import signal
 import sys
-import types
 from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
@@ -15,11 +15,10 @@ from typing import Any, TextIO
 
 import numpy as np
 import pytest
-from support.scenarios.vsl_training_points import TRAINING, Trained, call, key_of_made_up, made_up, nobody, shipped
+from support.scenarios.vsl_training_points import TRAINING, Trained, call, made_up, nobody, shipped
 from support.wording import Wording
 
-from handover.controllers.vsl.default_model import DEFAULT_MODEL
-from handover.controllers.vsl.hybrid_kinematics import HybridKinematics, InvalidModel, Params
+from handover.controllers.vsl.hybrid_kinematics import MODELS, HybridKinematics, InvalidModel, Params
 from handover.controllers.vsl.kinematics import Elbow
 from handover.controllers.vsl.learned_model import ForwardInput, VslModel
 from handover.controllers.vsl.model_text import read_model
@@ -33,14 +32,8 @@ from handover.scenarios.vsl.training import Progress, VslTraining
 from handover.scenarios.vsl.training_data import Measured
 
 
-def test_a_model_has_the_same_text_in_both_forms_and_says_what_it_was_made_of(trained: Trained, tmp_path: Path):
-    result = call("--data", trained.data, "--out", tmp_path / "m.py")
-    assert result.exit_code == 0, result.output
+def test_a_model_says_what_it_was_made_of(trained: Trained):
     assert "400 points" in trained.output
-    assert [p.name for p in tmp_path.iterdir()] == ["m.py"]
-    module = types.ModuleType("m")
-    exec((tmp_path / "m.py").read_text(), vars(module))
-    assert vars(module)["DEFAULT_MODEL"] == trained.model.read_text()
     text = read_model(trained.model).provenance
     assert (text["arm"]["fmu"], text["arm"]["parameters"]["motion"], text["seed"]) == ("VslArm", "QUASI_STATIC", 1)
     assert 300 < sum(text["points"][k] for k in ("training", "validation", "test")) <= 400
@@ -108,7 +101,7 @@ def test_model_and_data_are_written_before_the_curve(tmp_path: Path, monkeypatch
 
 @pytest.mark.slow
 def test_a_model_is_adapted_to_stiffer_links_by_few_points(tmp_path: Path):
-    (tmp_path / "m.json").write_text(DEFAULT_MODEL)
+    shutil.copyfile(MODELS / "cubic.json", tmp_path / "m.json")
     stiffer = ("--arm", "EI_0=0.605", "--arm", "EI_p=1.155e-5")
     result = call("--adapt", tmp_path / "m.json", "--points", "50", *stiffer, "--out", tmp_path / "a.json")
     assert result.exit_code == 0, result.output
@@ -199,7 +192,6 @@ def test_a_folder_that_has_become_a_file_is_reported_in_a_line(tmp_path: Path, m
     (tmp_path / "a").mkdir()
     write_data(tmp_path / "d.parquet", made_up(400))
     monkeypatch.setattr(VslTraining, "learn", gone)
-    monkeypatch.setattr(vsl_train_command, "content_key", key_of_made_up)
     result = call("--data", tmp_path / "d.parquet", "--out", tmp_path / "a" / "m.json")
     assert result.exit_code == 2
     assert "cannot be written: File exists" in result.output

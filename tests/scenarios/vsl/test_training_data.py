@@ -8,13 +8,11 @@ from typing import Any
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from support.scenarios.vsl_training_points import ARM, Trained, call, key_of_made_up, made_up, nobody
+from support.scenarios.vsl_training_points import ARM, Trained, call, made_up, nobody
 from support.wording import Wording
 
 from handover.fmus.build import cached
-from handover.scenarios.cli.robots import vsl_train as vsl_train_command
 from handover.scenarios.vsl.data_file import InvalidData, read_data, write_data
-from handover.scenarios.vsl.model_file import content_key
 from handover.scenarios.vsl.training import VslTraining
 
 PARAMETERS = made_up(1).origin["arm"]["parameters"]
@@ -29,8 +27,7 @@ def test_training_from_saved_points_gives_the_same_bytes(trained: Trained, tmp_p
 
 
 @pytest.mark.parametrize("learned", [["--learned", "physics"], ["--friction-compensation"]], ids=" ".join)
-def test_what_was_learned_is_told(learned: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(vsl_train_command, "content_key", key_of_made_up)
+def test_what_was_learned_is_told(learned: list[str], tmp_path: Path):
     write_data(tmp_path / "d.parquet", made_up(240))
     done = call("--data", tmp_path / "d.parquet", *learned, "--out", tmp_path / "a.json")
     assert done.exit_code == 0, done.output
@@ -41,7 +38,7 @@ def test_what_was_learned_is_told(learned: list[str], tmp_path: Path, monkeypatc
 def test_points_of_a_file_are_those_written(tmp_path: Path):
     measured = made_up(100)
     write_data(tmp_path / "d.parquet", measured)
-    back = read_data(tmp_path / "d.parquet", "k", ARM)
+    back = read_data(tmp_path / "d.parquet", ARM)
     assert back.digest() == measured.digest()
     assert back.origin == measured.origin
     for name, values in vars(measured.points).items():
@@ -85,7 +82,6 @@ def about(**origin: Any) -> Callable[[Any], Any]:
         pytest.param(with_column("i_meas[3]", [0.0] * 7 + [float("nan")] * 93), id="no numbers"),
         pytest.param(with_column("q_cmd[1]", ["x"] * 100), id="text"),
         pytest.param(with_column("order", [0] * 100), id="one place in the order"),
-        pytest.param(about(arm={"key": "other"}), id="another arm's key"),
         pytest.param(about(links={"L_1": 0.15, "L_2": 0.2, "L_3": 0.2, "elbow": "UP"}), id="other links"),
         pytest.param(changed("p_meas", lambda p: 1e-5 * p), id="bar"),
         pytest.param(changed("i_meas", lambda i: 1e3 * i), id="milliamperes"),
@@ -95,8 +91,8 @@ def about(**origin: Any) -> Callable[[Any], Any]:
         pytest.param(changed("p_WG_meas", lambda x: 1e3 * x), id="millimetres"),
         pytest.param(about(version=9), id="version"),
         pytest.param(about(seed="x"), id="seed"),
-        pytest.param(about(arm={"key": "k", "parameters": PARAMETERS | {"EI_0": 1.0}}), id="another parameter"),
-        pytest.param(about(arm={"key": "k", "parameters": {}}), id="no parameters"),
+        pytest.param(about(arm={"parameters": PARAMETERS | {"EI_0": 1.0}}), id="another parameter"),
+        pytest.param(about(arm={"parameters": {}}), id="no parameters"),
         pytest.param(about(arm=None), id="no arm"),
         pytest.param(with_metadata(None), id="no metadata"),
         pytest.param(with_metadata({b"handover-vsl-data": b"{"}), id="no JSON"),
@@ -107,7 +103,7 @@ def test_data_that_cannot_be_trained_on_is_refused(change: Callable[[Any], Any],
     write_data(path, made_up(100))
     pq.write_table(change(pq.read_table(path)), path)
     with pytest.raises(InvalidData) as caught:
-        read_data(path, "k", ARM, PARAMETERS)
+        read_data(path, ARM, PARAMETERS)
     assert caught.value.path == path
     wording.check(caught.value.fault)
 
@@ -119,15 +115,12 @@ def test_points_of_the_oddest_arms_are_taken_back(arm: dict[str, Any], tmp_path:
     training = VslTraining(fmu=cached("VslArm", 3), kinematics=ARM, points=30, seed=0, arm=arm)
     measured, path = training.measure(nobody), tmp_path / "d.parquet"
     write_data(path, measured)
-    back = read_data(path, content_key(training.fmu), ARM, training.parameters())
+    back = read_data(path, ARM, training.parameters())
     training.check(back)
     assert back.digest() == measured.digest()
 
 
-def test_data_of_an_arm_with_other_parameters_are_refused_unless_that_arm_is_meant(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wording: Wording
-):
-    monkeypatch.setattr(vsl_train_command, "content_key", key_of_made_up)
+def test_data_of_an_arm_with_other_parameters_are_refused_unless_that_arm_is_meant(tmp_path: Path, wording: Wording):
     measured, out, data = made_up(240), tmp_path / "m.json", tmp_path / "d.parquet"
     measured.origin["arm"]["parameters"]["EI_0"] = 0.605
     write_data(data, measured)
@@ -140,10 +133,7 @@ def test_data_of_an_arm_with_other_parameters_are_refused_unless_that_arm_is_mea
     assert call("--data", data, "--adapt", out, "--out", tmp_path / "n.json").exit_code == 0
 
 
-def test_data_of_too_few_points_or_without_gauges_are_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wording: Wording
-):
-    monkeypatch.setattr(vsl_train_command, "content_key", key_of_made_up)
+def test_data_of_too_few_points_or_without_gauges_are_refused(tmp_path: Path, wording: Wording):
     without_gauges = made_up(400)
     without_gauges.points.p[:] = 1e5
     far = made_up(400)

@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from click.testing import CliRunner, Result
 
-from handover.controllers.vsl.default_model import DEFAULT_MODEL
+from handover.controllers.vsl.hybrid_kinematics import MODELS
 from handover.controllers.vsl.kinematics import Elbow, VslKinematics
 from handover.controllers.vsl.learned_model import VslModel
-from handover.controllers.vsl.model_text import parse_model
+from handover.controllers.vsl.model_text import read_model
 from handover.cosim.blocks.ports import Floats
 from handover.fmus.build import cached
 from handover.scenarios.cli.robots.vsl_train import vsl_train
@@ -47,10 +47,6 @@ def points(n: int, droop: Floats, sag: Floats) -> Dataset:
     return Dataset(p_WG, rng.uniform(5e4, 2e5, (n, 2)), rng.uniform(-1.0, 1.0, (n, 3)), q, q_cmd)
 
 
-def key_of_made_up(_fmu: Path) -> str:
-    return "k"
-
-
 def nobody(_done: float, _of: float) -> None:
     """Take note of no progress."""
 
@@ -65,9 +61,9 @@ def made_up(n: int, seed: int = 2) -> Measured:
     usable = np.flatnonzero(np.arange(n) % 10 != 9)
     order[usable] = np.random.default_rng(seed).permutation(len(usable))
     links = {"L_1": 0.15, "L_2": 0.225, "L_3": 0.225, "elbow": "UP"}
-    arm = {"key": "k", "parameters": replace(TRAINING, fmu=cached("VslArm", 3)).parameters()}
+    arm = {"parameters": replace(TRAINING, fmu=cached("VslArm", 3)).parameters()}
     return Measured(data, order, {"arm": arm, "links": links, "seed": seed, "walk": False})
 
 
 def shipped() -> VslModel:
-    return parse_model(DEFAULT_MODEL, "that ships")
+    return read_model(MODELS / "cubic.json")
