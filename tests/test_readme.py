@@ -296,7 +296,7 @@ def test_campaigns_are_compared(tmp_path: Path):
     assert {"report.html", "comparison.csv", "comparison.json", "figures"} == {p.name for p in comparison.iterdir()}
     found = json.loads((comparison / "comparison.json").read_bytes())
     assert all(test["paired"] for test in found["tests"])  # "run by run where they share seeds, as these do"
-    assert {p.suffix for p in (comparison / "figures").iterdir()} == {".png", ".svg"}
+    assert {p.suffix for p in (comparison / "figures").iterdir()} == {".png", ".svg", ".pdf"}
 
 
 def test_the_plan_of_a_study_is_written_and_checked(tmp_path: Path):

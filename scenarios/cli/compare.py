@@ -21,7 +21,7 @@ _HELP = """Put campaigns, or runs, of one scenario on one page and in one table.
 \b
 Examples
   handover sweep ir_grasp thing=cylinder,baby_cup_a -p strategy=reflex --repeat 6 --out ours
-  handover sweep ir_grasp thing=cylinder,baby_cup_a -p strategy=blind --repeat 6 --out theirs
+  handover sweep ir_grasp thing=cylinder,baby_cup_a -p strategy=forward --repeat 6 --out theirs
   handover compare ours theirs
   handover run flyer_impedance -p behaviour=rigid --out a
   handover run flyer_impedance -p behaviour=compliant --out b
@@ -29,11 +29,11 @@ Examples
 
 Points of campaigns are matched by the values of the parameters that any of them varies. At each, success rates and
 metrics stand beside each other with 95 % intervals, and each two campaigns are tested against each other: run by run
-where they share seeds, as campaigns with the same points and --seed do; metrics are tested, too. Five pairs cannot
-show a difference, however large: p stays at 0.0625 or above; six can. Of runs, the same curves are drawn over each
-other.
+where they share seeds, as campaigns with the same points and --seed do. Five pairs cannot show a difference, however
+large: p stays at 0.0625 or above; six can. Of runs, the same curves are drawn over each other.
 
-The folder holds report.html, comparison.csv, comparison.json, and figures for papers in figures/ as PNG and SVG.
+The folder holds report.html, comparison.csv and comparison.json; figures/ has figures in the width of a column, as
+PDF, SVG and PNG.
 Settings in which the entries differ are listed, units and versions included.
 """
 

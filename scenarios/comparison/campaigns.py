@@ -275,10 +275,10 @@ class SuccessTest:
         return least_p_of_pairs(n) if self.paired else two_proportions(n, n, 0, others)
 
     @property
-    def all_succeeded(self) -> bool:
-        """Whether all runs of both campaigns have succeeded, so that only their metrics can differ."""
+    def all_alike(self) -> bool:
+        """Whether all runs of both campaigns have succeeded, or none, so that only their metrics can differ."""
         succeeded, n, others_succeeded, others = self.counts
-        return succeeded == n and others_succeeded == others
+        return succeeded + others_succeeded in (0, n + others)
 
 
 @dataclass(frozen=True, kw_only=True)

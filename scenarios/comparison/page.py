@@ -32,7 +32,7 @@ from handover.scenarios.comparison.sections import (
 )
 from handover.scenarios.comparison.tables import campaigns_csv, campaigns_data, runs_csv, runs_data
 from handover.scenarios.experiment.experiment import Figure
-from handover.scenarios.experiment.plotting import draw_time_figures
+from handover.scenarios.experiment.plotting import PRINTED_FORMATS, draw_time_figures
 from handover.scenarios.experiment.time_plot import TimeFigure
 from handover.scenarios.reporting.page import Section, write_page
 from handover.scenarios.reporting.time_plots import time_plots_section
@@ -119,7 +119,7 @@ class RunComparison:
         folder.mkdir(parents=True, exist_ok=True)
         with faults.tolerated("figure curves could not be drawn"):
             spec = TimeFigure(name="curves", caption=caption, plots=plots)
-            return draw_time_figures([spec], self.overlay.time, folder)
+            return draw_time_figures([spec], self.overlay.time, folder, as_printed=True)
         return ()
 
     def sections(self, page: Path, figures: Sequence[Figure]) -> Sequence[Section | None]:
@@ -187,7 +187,7 @@ def write_comparison(comparison: Comparison, folder: RunFolder) -> dict[str, Any
     faults = ToleratedFaults()
     with disk_errors_reported(folder.figures):
         figures = comparison.draw(folder.figures, faults)
-    drawn = [f"figures/{f.name}.{end}" for f in figures for end in ("png", "svg")]
+    drawn = [f"figures/{f.name}.{end}" for f in figures for end in PRINTED_FORMATS]
     data = {**comparison.data, "figures": drawn, **({"left_out": faults.lines} if faults.lines else {})}
     write_whole(folder.path / "comparison.json", json.dumps(data, indent=2, allow_nan=False) + "\n")
     write_whole(folder.path / "comparison.csv", comparison.csv)

@@ -31,7 +31,7 @@ _ALIKE, _HIDDEN = 0.004, 0.2
 _HELD = 0.7
 """Of a signal's steps: one that changes in fewer is held between them, as a sampled unit's output."""
 
-_LINE = 20
+_LINE = 18
 """Letters that fit along a vertical axis."""
 
 

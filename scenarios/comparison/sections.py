@@ -19,6 +19,7 @@ from handover.scenarios.comparison.entries import CampaignEntry, Difference, Ent
 from handover.scenarios.comparison.runs import MetricRow
 from handover.scenarios.experiment.display_unit import display_unit
 from handover.scenarios.experiment.experiment import Figure
+from handover.scenarios.experiment.plotting import PRINTED_FORMATS
 from handover.scenarios.reporting.html import Cell, rows_table
 from handover.scenarios.reporting.page import Section
 
@@ -184,13 +185,15 @@ def _signed(value: float) -> str:
     return "0" if value == 0.0 else f"{value:+.3g}" if abs(value) < 999.5 else f"{value:+.4g}"
 
 
-def files_section(figures: Sequence[Figure], formats: Sequence[str] = ("png", "svg")) -> Section | None:
+def files_section(figures: Sequence[Figure]) -> Section | None:
     """Return links to the figures for papers, with their captions; None if there are none."""
     if not figures:
         return None
     rows = [
         (
-            Markup(", ").join(Markup("<a href='figures/{0}.{1}'>{0}.{1}</a>").format(f.name, end) for end in formats),
+            Markup(", ").join(
+                Markup("<a href='figures/{0}.{1}'>{0}.{1}</a>").format(f.name, e) for e in PRINTED_FORMATS
+            ),
             f.caption,
         )
         for f in figures

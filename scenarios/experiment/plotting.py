@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -19,8 +20,20 @@ from handover.cosim.blocks.ports import Floats
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.time_plot import COLOURS, Phase, TimeFigure, TimePlot
 
+COLUMN, PAGE = 3.5, 7.16
+"""Widths of a column and of a page's text in IEEE's journals, in."""
+
+FORMATS, PRINTED_FORMATS = ("png", "svg"), ("png", "svg", "pdf")
+"""Suffixes of a figure's files; of one at the size of print."""
+
+MARKERS = ("o", "s", "D", "^", "v", "P", "X", "<", ">")
+"""A mark for each of `COLOURS`, as not all of these differ for everybody, or in print without colours."""
+
+_LETTERS, _PRINTED_LETTERS = 10.0, 8.0
+"""Sizes of letters, points."""
+
 STYLE: dict[Any, Any] = {
-    "font.size": 10,
+    "font.size": _LETTERS,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
@@ -30,6 +43,7 @@ STYLE: dict[Any, Any] = {
     "figure.constrained_layout.use": True,
     "savefig.dpi": 150,
     "svg.hashsalt": "handover",
+    "pdf.fonttype": 42,  # TrueType, as publishers ask for
 }
 
 _SOFT, _SHADE = "#4d5866", "#eef2f7"
@@ -42,6 +56,8 @@ _LEVELS = ((0, (7, 3)), (0, (7, 2, 1, 2)))
 
 _WIDTH, _ALONE, _STACKED = 8.0, 2.6, 1.6
 """Width of a time figure, height of a single plot, and of each of several below each other, in."""
+_MARKS = 6
+"""Marks along a curve."""
 _LETTER, _UPRIGHT = 5.2, 8.5
 """Widths of a letter, and of a phase's name that stands upright, points."""
 
@@ -62,19 +78,24 @@ def figure(
     columns: int = 1,
     size: tuple[float, float] = (8.0, 3.2),
     heights: Sequence[float] | None = None,
+    *,
+    as_printed: bool = False,
 ) -> Generator[list[Axes], None, None]:
     """Make a figure of `rows` x `columns` axes, row by row; save it as PNG and SVG on leaving the context.
 
-    `path` is without suffix, `size` in inches; `heights` are the rows' relative heights. pyplot, which holds what a
+    `path` is without suffix, `size` in inches; `heights` are the rows' relative heights. A figure `as_printed` has the
+    size that it has on paper: its letters are of 8 points, and it is saved as PDF, too. pyplot, which holds what a
     user's own program draws, is left alone.
     """
     with own_style():
+        if as_printed:
+            mpl.rcParams.update({"font.size": _PRINTED_LETTERS, "savefig.dpi": 300})
         canvas = Canvas(figsize=size)
         FigureCanvasAgg(canvas)  # draws it to memory
         axes: Any = canvas.subplots(rows, columns, squeeze=False, height_ratios=heights)
         axes_by_row: list[Axes] = axes.reshape(-1).tolist()
         yield axes_by_row
-        _save(canvas, path)
+        _save(canvas, path, PRINTED_FORMATS if as_printed else FORMATS)
 
 
 def legend_below(axes: Axes, entries: Mapping[str, Artist] | None = None, columns: int | None = None) -> None:
@@ -83,34 +104,43 @@ def legend_below(axes: Axes, entries: Mapping[str, Artist] | None = None, column
     _canvas(axes).legend(handles, labels, loc="outside lower center", ncols=columns or len(labels))
 
 
-def draw_time_figures(figures: Sequence[TimeFigure], time: Floats, folder: Path) -> list[Figure]:
-    """Draw curves over the record's time, s, into a folder."""
+def draw_time_figures(
+    figures: Sequence[TimeFigure], time: Floats, folder: Path, *, as_printed: bool = False
+) -> list[Figure]:
+    """Draw curves over the record's time, s, into a folder; `as_printed` in the width of a column, as of `figure`."""
     for spec in figures:
-        _draw_time_figure(spec, time, folder / spec.name)
+        _draw_time_figure(spec, time, folder / spec.name, as_printed=as_printed)
     return [Figure(spec.name, spec.caption) for spec in figures]
 
 
-def _draw_time_figure(spec: TimeFigure, time: Floats, path: Path) -> None:
+def _draw_time_figure(spec: TimeFigure, time: Floats, path: Path, *, as_printed: bool) -> None:
     plots, columns = spec.plots, spec.columns
     rows = ceil(len(plots) / columns)
-    width = 72.0 * 0.86 * _WIDTH / columns
+    scale = _PRINTED_LETTERS / _LETTERS if as_printed else 1.0
+    width = 72.0 * 0.86 * (COLUMN / scale if as_printed else _WIDTH) / columns
     span = float(time[-1] - time[0])
     above = max(_height_of_names(p.phases, span / width) for p in plots) / 72.0
-    legends = sum(_legend_rows(p, width) for p in plots[:rows]) * 0.18
-    size = (_WIDTH, (_ALONE if rows == 1 else _STACKED * rows) + above + legends + 0.4)
-    with figure(path, rows, columns, size) as grid:
+    bottom = {k for k in range(len(plots)) if k % rows == rows - 1 or k == len(plots) - 1}
+    with_legend = [
+        k for k, p in enumerate(plots) if p.has_legend and (k in bottom or _entries(p) != _entries(plots[k + 1]))
+    ]
+    legends = sum(_legend_rows(plots[k], width) for k in with_legend if k < rows) * 0.18
+    height = (_ALONE if rows == 1 else _STACKED * rows) + above + legends + 0.4
+    size = (COLUMN if as_printed else _WIDTH, scale * height)
+    with figure(path, rows, columns, size, as_printed=as_printed) as grid:
         for k, plot in enumerate(plots):
             column, row = divmod(k, rows)
             axes = grid[row * columns + column]
-            is_last = row == rows - 1 or k == len(plots) - 1
             draw_time_plot(axes, plot, time)
+            if as_printed:
+                _mark_curves(axes, plot, time)
             if row == 0 or plot.phases != plots[k - 1].phases:
                 name_phases(axes, plot.phases, span / width)
-            if is_last:
+            if k in bottom:
                 axes.set_xlabel("time (s)")
-            axes.tick_params(labelbottom=is_last)
-            if plot.has_legend and (is_last or _entries(plot) != _entries(plots[k + 1])):
-                _legend_below(axes, plot, width, 34.0 if is_last else 6.0)
+            axes.tick_params(labelbottom=k in bottom)
+            if k in with_legend:
+                _legend_below(axes, plot, width, scale * (34.0 if k in bottom else 6.0))
         for axes in grid:
             axes.set_visible(axes.has_data())
         _canvas(grid[0]).align_ylabels()
@@ -219,8 +249,7 @@ def _legend_columns(plot: TimePlot, width: float) -> int:
 
 
 def _legend_rows(plot: TimePlot, width: float) -> int:
-    count = len(plot.curves) + len(plot.levels)
-    return ceil(count / _legend_columns(plot, width)) if plot.has_legend else 0
+    return ceil((len(plot.curves) + len(plot.levels)) / _legend_columns(plot, width))
 
 
 def _legend_below(axes: Axes, plot: TimePlot, width: float, gap: float) -> None:
@@ -232,8 +261,16 @@ def _legend_below(axes: Axes, plot: TimePlot, width: float, gap: float) -> None:
         bbox_to_anchor=(0.5, 0.0),
         bbox_transform=below,
         borderaxespad=0.0,
-        fontsize=9,
+        fontsize=0.9 * mpl.rcParams["font.size"],
     )
+
+
+def _mark_curves(axes: Axes, plot: TimePlot, time: Floats) -> None:
+    """Mark curves of several colours at some times, beside the others' marks."""
+    if len(set(plot.colours)) > 1:
+        for k, (line, colour) in enumerate(zip(axes.lines, plot.colours, strict=False)):
+            at = time[0] + (time[-1] - time[0]) * (np.arange(_MARKS) + (k + 0.5) / len(plot.curves)) / _MARKS
+            line.set(marker=MARKERS[colour], ms=3.5, markevery=np.searchsorted(time, at).tolist())
 
 
 def _canvas(axes: Axes) -> Canvas:
@@ -242,8 +279,13 @@ def _canvas(axes: Axes) -> Canvas:
     return canvas
 
 
-def _save(canvas: Canvas, path: Path) -> None:
-    for file, metadata in ((path.with_suffix(".png"), {"Software": None}), (path.with_suffix(".svg"), {"Date": None})):
+_METADATA = {"png": {"Software": None}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
+"""What matplotlib writes into files by itself, and would differ from day to day."""
+
+
+def _save(canvas: Canvas, path: Path, formats: Sequence[str]) -> None:
+    for ending in formats:
+        file, metadata = path.with_name(f"{path.name}.{ending}"), _METADATA[ending]
         file.unlink(missing_ok=True)  # a link in a folder of somebody else would have another file written
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", "Glyph")  # it has a name's letter raw

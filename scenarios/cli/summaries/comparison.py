@@ -8,6 +8,7 @@ from rich.text import Text
 
 from handover.scenarios.cli.console import heading, open_console
 from handover.scenarios.comparison.campaigns import (
+    EVERY,
     ComparedCampaigns,
     MetricTest,
     bounds_of_p,
@@ -53,13 +54,10 @@ def _print_campaigns(console: Console, results: ComparedCampaigns) -> None:
 
 
 def _print_tests(console: Console, results: ComparedCampaigns) -> None:
-    """Print the tests of successes; of metrics where all runs succeed, as successes do not differ there."""
-    tests = success_tests(results)
-    by_success = [t for t in tests if not t.all_succeeded]
-    alike = {(t.key, t.first, t.second) for t in tests if t.all_succeeded}
-    of_metrics = [
-        t for m in results.shown_metrics for t in metric_tests(results, m) if (t.key, t.first, t.second) in alike
-    ]
+    """Print the tests of successes where these differ at all, and of metrics, those over all points first."""
+    by_success = [t for t in success_tests(results) if not t.all_alike]
+    of_metrics = [t for m in results.shown_metrics for t in metric_tests(results, m)]
+    of_metrics.sort(key=lambda t: t.key != EVERY)
     successes = [
         [
             results.label_of(t.key),
@@ -76,13 +74,14 @@ def _print_tests(console: Console, results: ComparedCampaigns) -> None:
             results.label_of(t.key),
             t.metric,
             f"{t.second} – {t.first}",
+            str(t.n),
             _difference(results, t),
             t.test.method,
             f"{t.test.p:.3g}",
         ]
         for t in of_metrics
     ]
-    _print_table(console, ("at", "metric", "difference of", "median", "test", "p"), metrics)
+    _print_table(console, ("at", "metric", "difference of", "runs each", "median", "test", "p"), metrics)
     for sentence in bounds_of_p([*by_success, *of_metrics]):
         console.print(sentence, markup=False, soft_wrap=True)
 

@@ -1,11 +1,13 @@
-"""Figures of a campaign: PNG and SVG of success and metrics, for few points and many."""
+"""Figures of a campaign: success and metrics, for few points and many, in the width of a column."""
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
 import pytest
 from matplotlib.figure import Figure as Canvas
+from matplotlib.text import Text
 from support.campaigns import results_of
 
 from handover.scenarios.campaign_report.figures import draw_campaign
@@ -18,7 +20,7 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> dict[str, Canvas]:
     """Return figures by their names, which are drawn and not saved."""
     kept: dict[str, Canvas] = {}
 
-    def look(canvas: Canvas, path: Path) -> None:
+    def look(canvas: Canvas, path: Path, _formats: Sequence[str]) -> None:
         canvas.draw_without_rendering()
         kept[path.name] = canvas
 
@@ -35,10 +37,42 @@ def test_success_and_the_metrics_that_matter_are_drawn_with_medians_and_runs_tha
     results = results_of("ir_grasp", points, 4, moved=[0.01] * 8, unheard_of=[1.0] * 8, success=success)
     draw_campaign(results, tmp_path, ToleratedFaults())
     assert list(drawn) == ["success_by_point", "moved_by_point"]
-    legend = drawn["moved_by_point"].axes[0].get_legend()
-    assert legend is not None
+    (legend,) = drawn["moved_by_point"].legends
     runs = {True: ["run that succeeded"], False: ["run that failed"], None: ["run that failed", "run that succeeded"]}
     assert [text.get_text() for text in legend.get_texts()] == ["median, 95 % interval", *runs[succeed]]
+
+
+LIST = [{"thing": t, "strategy": s, "forward": f} for t in ("baby_cup_a", "cylinder") for s in "ab" for f in "01"]
+
+
+@pytest.mark.parametrize("points", [[{"thing": f"paper_box_{k}"} for k in range(6)], LIST])
+def test_in_a_column_all_that_is_drawn_stays_within_the_paper_and_beside_the_legend(
+    points: Sequence[Mapping[str, str]], tmp_path: Path, drawn: dict[str, Canvas]
+):
+    n = 3 * len(points)
+    success = [k % 2 == 0 for k in range(n)]
+    results = results_of("ir_grasp", points, 3, final_distance_index=[0.01 * k for k in range(n)], success=success)
+    draw_campaign(results, tmp_path, ToleratedFaults())
+    assert len(drawn) == 2
+    for canvas in drawn.values():
+        width, _ = canvas.get_size_inches()
+        assert width * 25.4 == pytest.approx(88.9)  # a column of IEEE's journals
+        (axes,) = canvas.axes
+        drawn_box, paper = axes.get_tightbbox(), canvas.bbox.padded(1.0)
+        assert drawn_box is not None
+        assert paper.x0 <= drawn_box.x0 <= drawn_box.x1 <= paper.x1
+        assert paper.y0 <= drawn_box.y0 <= drawn_box.y1 <= paper.y1
+        assert all(legend.get_window_extent().y1 <= drawn_box.y0 for legend in canvas.legends)
+        assert min(float(text.get_fontsize()) for text in canvas.findobj(Text)) >= 7.0
+
+
+def test_metrics_that_differ_after_a_dot_have_files_of_their_own_of_which_one_is_a_pdf(tmp_path: Path):
+    results = results_of("unknown", [{}], 2, **{"arm.x": [1.0, 2.0], "arm.y": [2.0, 3.0]})
+    draw_campaign(results, tmp_path, ToleratedFaults())
+    assert {p.name for p in tmp_path.iterdir()} == {
+        f"{name}_by_point.{end}" for name in ("success", "arm.x", "arm.y") for end in ("png", "svg", "pdf")
+    }
+    assert b"/MediaBox [ 0 0 252 " in (tmp_path / "arm.x_by_point.pdf").read_bytes()  # 3.5 in
 
 
 def test_of_more_points_than_a_figure_has_room_for_there_is_none(tmp_path: Path):
@@ -55,7 +89,7 @@ def test_a_figure_that_cannot_be_drawn_is_a_line_and_no_metrics_name_leads_out_o
     assert len(draw_campaign(results, figures, faults)) == 3
     assert [line.partition(":")[0] for line in faults.lines] == ["figure $a^$_by_point could not be drawn"]
     written = [p for p in tmp_path.rglob("*") if p.is_file()]
-    assert len(written) == 6
+    assert len(written) == 9
     assert {p.parent for p in written} == {figures}
 
 

@@ -12,6 +12,7 @@ from support.commands import call
 from support.opened_page import opened, overflow
 
 from handover.scenarios.campaign.plan import CampaignPlan
+from handover.scenarios.experiment.plotting import PRINTED_FORMATS
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +53,7 @@ def test_a_known_difference_is_found_run_by_run(grasps: Path, tmp_path: Path, br
     assert (moved["paired"], moved["n"], moved["difference"], moved["p"]) == (True, 2, 0.0, 1.0)
     assert len((out / "comparison.csv").read_text().splitlines()) == 4
     names = ("success_by_point", "moved_by_point", "left_behind_by_point")
-    assert {p.name for p in (out / "figures").iterdir()} == {f"{n}.{end}" for n in names for end in ("png", "svg")}
+    assert {p.name for p in (out / "figures").iterdir()} == {f"{n}.{end}" for n in names for end in PRINTED_FORMATS}
     with opened(browser, out / "report.html") as page:
         assert page.inner_text("h1") == "ir_grasp: 10 cm and <at once>"
         assert page.locator(".plot:has(.main-svg)").count() == page.locator(".plot").count() == 2
@@ -74,7 +75,7 @@ def test_runs_are_compared_by_their_curves(grasps: Path, tmp_path: Path, browser
     assert done.exit_code == 0, done.output
     assert f"report: {out / 'report.html'}" in done.stdout
     assert "they differ in: strategy, forward" in done.stdout
-    assert {p.name for p in (out / "figures").iterdir()} == {"curves.png", "curves.svg"}
+    assert {p.name for p in (out / "figures").iterdir()} == {f"curves.{end}" for end in PRINTED_FORMATS}
     assert json.loads((out / "comparison.json").read_bytes())["curves"] == ["scene.p_WH[1]", "scene.p_WH[2]"]
     assert (out / "comparison.csv").read_text().startswith("metric,unit,far,near\n")
     done = compare(*folders, "--out", tmp_path / "plots", "--json")  # the scenario's own, as no signal is named
@@ -110,13 +111,14 @@ def test_without_a_folder_it_is_one_of_its_own_and_long_tables_are_cut(here: Pat
 
 
 @pytest.mark.usefixtures("empty_figures")
-def test_where_all_runs_succeed_the_tests_of_metrics_are_printed(here: Path):
+@pytest.mark.parametrize("succeeded", [0, 3, 5])
+def test_metrics_are_tested_always_and_successes_where_any_differ(here: Path, succeeded: int):
     for name, moved in (("a", [0.01, 0.02, 0.03, 0.04, 0.05]), ("b", [0.02, 0.04, 0.06, 0.08, 0.1])):
-        table = table_of([{}], 5, moved=moved, success=[True] * 5)
+        table = table_of([{}], 5, moved=moved, success=[k < succeeded for k in range(5)])
         folder_of(here / name, campaign_metadata("ir_grasp", [{}], 5), table)
     done = compare("a", "b", "--metric", "moved")
     assert done.exit_code == 0, done.output
     lines = [line.split() for line in done.stdout.splitlines()]
-    assert ["all", "runs", "moved", "b", "–", "a", "+30", "mm", "Wilcoxon", "0.0625"] in lines
-    assert "McNemar" not in done.stdout  # whose p is 1
+    assert ["all", "runs", "moved", "b", "–", "a", "5", "+30", "mm", "Wilcoxon", "0.0625"] in lines
+    assert ("McNemar" in done.stdout) == (succeeded == 3)  # otherwise its p is 1
     assert "With 5 pairs p cannot fall below 0.0625" in done.stdout

@@ -129,7 +129,7 @@ def test_of_a_campaign_page_and_figures_are_written_where_they_are_asked_for(tmp
     assert report(campaign.path, "--out", page) == (0, f"report: {page}\n")
     assert sorted(os.listdir(campaign.path)) == before
     assert report(campaign.path, "--figures")[0] == 0
-    assert {p.name for p in campaign.figures.iterdir()} == {"success_by_point.png", "success_by_point.svg"}
+    assert {p.name for p in campaign.figures.iterdir()} == {f"success_by_point.{end}" for end in ("png", "svg", "pdf")}
 
 
 def test_pages_of_a_campaigns_runs_are_written_and_linked_if_they_are_asked_for(tmp_path: Path):

@@ -114,7 +114,7 @@ def test_axes_have_room_for_all_runs_and_lines_for_long_labels(tmp_path: Path):
     plots = overlaid(entries).plots
     assert [p.title for p in plots] == ["Tip: tip by the servos, links taken as rigid", "Tip: tip"]
     assert [p.limits for p in plots] == [(0.0, 5.0)] * 2
-    assert [p.axis_label for p in plots] == ["x, tip by the\nservos, links taken\nas rigid (m)", "x, tip (m)"]
+    assert [p.axis_label for p in plots] == ["x, tip by the\nservos, links\ntaken as rigid (m)", "x, tip (m)"]
 
 
 def test_a_curve_that_a_unit_does_not_give_is_left_out_of_that_run_alone(grasp_without_reflex: Path):
