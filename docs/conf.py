@@ -2,9 +2,11 @@
 
 import shutil
 import sys
+from functools import partialmethod
 from importlib.metadata import version as version_of
 from pathlib import Path
 
+from nbclient import NotebookClient
 from sphinx.application import Sphinx
 
 DOCS = Path(__file__).parent
@@ -40,6 +42,8 @@ nb_execution_excludepatterns = [] if shutil.which("octave-cli") else ["tutorials
 nb_execution_raise_on_error = True
 nb_execution_timeout = 600
 nb_merge_streams = True
+# IPython sends what a command prints in pieces of 100 characters; MyST-NB alone would make lines of them.
+NotebookClient.__init__ = partialmethod(NotebookClient.__init__, coalesce_streams=True)
 
 html_theme = "furo"
 html_title = f"handover-cosim {release}"
