@@ -70,48 +70,116 @@ _STROKES: dict[str, dict[str, Any]] = {
     "dotted": {"width": 1.2, "dash": "dot"},
 }
 _LEVELS = ("longdash", "longdashdot")
+_MAX_PANELS = 6
+_HEIGHT, _PANEL, _GAP, _MARGINS = 280, 180, 40, 74
+"""Heights of a figure of one plot, of each panel more, between two panels, and above and below all axes, px."""
 
 
 def time_plots_section(plots: Sequence[TimePlot], time: Floats) -> Section | None:
-    """Return plots below each other, over the record's time, s; None where there are none."""
-    if not plots:
-        return None
-    html = Markup("").join(
-        Markup("<h3>{}</h3>").format(p.title) + plot_html(time_figure(p, time), height=280, label=p.title)
-        for p in plots
-    )
-    return Section(anchor="time", title="Over time", html=html, scripts=("phases.js",))
+    """Return plots below each other, over the record's time, s; None where there are none.
+
+    Plots that follow each other with the same legend and phases are panels of one figure. Names of phases that do not
+    fit over them take room above the first figure of these phases only.
+    """
+    html, named = Markup(), list[Sequence[Phase]]()
+    for first, *below in _panels(plots):
+        figure = time_figure(first, time, below, brief=first.phases in named)
+        label, height = "; ".join(p.title for p in (first, *below)), _HEIGHT + _PANEL * len(below)
+        html += Markup("<h3>{}</h3>").format(first.title) + plot_html(figure, height=height, label=label)
+        named.append(first.phases)
+    return Section(anchor="time", title="Over time", html=html, scripts=("phases.js",)) if plots else None
 
 
-def time_figure(plot: TimePlot, time: Floats) -> go.Figure:
-    """Return a plot as a Plotly figure, with its unit at the axis and in tooltips; the page's script adds phases."""
+def _panels(plots: Sequence[TimePlot]) -> list[list[TimePlot]]:
+    """Return the plots of each figure."""
+    figures: list[list[TimePlot]] = []
+    for plot in plots:
+        last = figures[-1] if figures else []
+        if last and len(last) < _MAX_PANELS and plot.phases == last[0].phases and _legend(plot) == _legend(last[0]):
+            last.append(plot)
+        else:
+            figures.append([plot])
+    return figures
+
+
+def _legend(plot: TimePlot) -> Sequence[object]:
+    entries = [(c.label, colour, c.stroke) for c, colour in zip(plot.curves, plot.colours, strict=True)]
+    return (*entries, *plot.level_labels) if plot.has_legend else ()
+
+
+def time_figure(plot: TimePlot, time: Floats, below: Sequence[TimePlot] = (), *, brief: bool = False) -> go.Figure:
+    """Return a plot as a Plotly figure, with its unit at the axis and in tooltips; the page's script adds phases.
+
+    Args:
+        plot: what is drawn.
+        time: the record's, s.
+        below: plots of the same phases and legend, which are drawn as panels below it.
+        brief: whether names of phases that do not fit over them are left out.
+    """
     meta: dict[str, Any] = {"time": True}
     if plot.phases:
-        meta["phases"] = _phases(plot.phases)
-    kind = {"type": "log", "dtick": 1} if plot.logarithmic else {"type": "linear"}
-    shown = {} if plot.shown_range is None else {"range": plot.shown_range}
-    unit = plot.unit_after_value
+        meta |= {"phases": _phases(plot.phases), "brief": brief}
+    panels = (plot, *below)
+    gap = _GAP / (_HEIGHT + _PANEL * len(below) - _MARGINS) if below else 0.0
+    high = (1.0 - gap * len(below)) / len(panels)
+    tops = [1.0 - k * (high + gap) for k in range(len(panels))]
+    axes = {
+        _axis_name(k).replace("y", "yaxis"): _axis(p, top - high, top)
+        for k, (p, top) in enumerate(zip(panels, tops, strict=True))
+    }
     return go.Figure(
-        [
-            *(_trace(c, time, unit, colour) for c, colour in zip(plot.curves, plot.colours, strict=True)),
-            *(
-                _level(level.value, label, time, dash)
-                for level, label, dash in zip(plot.levels, plot.level_labels, cycle(_LEVELS))
-            ),
-        ],
+        [trace for k, panel in enumerate(panels) for trace in _traces(panel, time, k)],
         {
             "meta": meta,
             "hovermode": "x unified",
             "showlegend": plot.has_legend,
-            "xaxis": {"title": {"text": TIME_AXIS}, "unifiedhovertitle": {"text": "%{x:.4~f} s"}},
-            "yaxis": {
-                "title": {"text": plot.axis_label.replace("\n", "<br>")},
-                "exponentformat": "power",
-                **kind,
-                **shown,
+            "legend": {"traceorder": "normal"},
+            "xaxis": {
+                "title": {"text": TIME_AXIS},
+                "unifiedhovertitle": {"text": "%{x:.4~f} s"},
+                "anchor": _axis_name(len(below)),
             },
+            **axes,
+            "annotations": [_title(p.title, top) for p, top in zip(below, tops[1:], strict=True)],
         },
     )
+
+
+def _axis_name(k: int) -> str:
+    """Return the vertical axis of a panel, by its number from the top, as Plotly's traces name it."""
+    return f"y{k + 1}" if k else "y"
+
+
+def _axis(plot: TimePlot, bottom: float, top: float) -> dict[str, Any]:
+    kind = {"type": "log", "dtick": 1} if plot.logarithmic else {"type": "linear"}
+    shown = {} if plot.shown_range is None else {"range": plot.shown_range}
+    return {
+        "title": {"text": plot.axis_label.replace("\n", "<br>")},
+        "exponentformat": "power",
+        "domain": [max(bottom, 0.0), top],
+        **kind,
+        **shown,
+    }
+
+
+def _title(text: str, top: float) -> dict[str, Any]:
+    """Return the title of a panel, which looks like the heading above the first one."""
+    place = {"x": 0, "xref": "paper", "xanchor": "left", "y": top, "yref": "paper", "yanchor": "bottom"}
+    font = {"size": 15, "color": "var(--ink)", "weight": "bold"}
+    return {"text": text, **place, "yshift": 4, "showarrow": False, "font": font}
+
+
+def _traces(plot: TimePlot, time: Floats, panel: int) -> list[Any]:
+    """Return the curves and levels of a panel; the legend has those of the first, for all."""
+    curves = (_trace(c, time, plot.unit_after_value, n) for c, n in zip(plot.curves, plot.colours, strict=True))
+    levels = (
+        _level(level.value, label, time, dash)
+        for level, label, dash in zip(plot.levels, plot.level_labels, cycle(_LEVELS))
+    )
+    traces = [*curves, *levels]
+    for trace in traces:
+        trace.update(yaxis=_axis_name(panel), legendgroup=trace.name, showlegend=panel == 0)
+    return traces
 
 
 def _trace(curve: Curve, time: Floats, unit: str, colour: int) -> Any:

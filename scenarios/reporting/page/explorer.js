@@ -2,7 +2,7 @@
 // being {of, value} or {of, t, y, held} with float32 in base64.
 "use strict";
 (() => {
-  const MOST_AXES = 6, HEIGHT = 230;
+  const MOST_AXES = 6, HEIGHT = 230, GAP = 28, ITEM = 18;  // px: of an axis, between two, and of an enumeration's item at it
   const STROKES = ["solid", "dash", "dot"];  // of an array's elements: what coincides is seen
   const root = document.querySelector(".explorer");
   if (!root) return;
@@ -50,10 +50,13 @@
     };
     if (rows.length > 1) layout.xaxis.anchor = `y${rows.length}`;
     const data = [];
-    let colour = 0, of = 0;
+    let colour = 0, of = 0, above = 0;
+    const heights = rows.map(({items}) => Math.max(HEIGHT, items ? ITEM * Object.keys(items).length + 60 : 0));
+    layout.meta.height = heights.reduce((sum, high) => sum + high, 20);
     rows.forEach((row, k) => {
       const n = k ? k + 1 : "";
-      layout[`yaxis${n}`] = axisOf(row, k, rows.length);
+      layout[`yaxis${n}`] = axisOf(row, above, heights[k] - (k < rows.length - 1 ? GAP : 0), layout.meta.height - 20);
+      above += heights[k];
       for (const s of row.signals)
         s.columns.forEach((c, i) => {
           if (s.columns.length <= 3 || i % 3 === 0) of = colour++ % 9;  // of many elements three have one, as in plots
@@ -63,9 +66,8 @@
     return {data, layout};
   }
 
-  function axisOf(row, k, n) {
-    const gap = n > 1 ? 0.12 / n : 0;
-    const axis = {domain: [1 - (k + 1) / n + gap, 1 - k / n], title: {text: titleOf(row)}, exponentformat: "power"};
+  function axisOf(row, above, high, all) {
+    const axis = {domain: [Math.max(1 - (above + high) / all, 0), 1 - above / all], title: {text: titleOf(row)}, exponentformat: "power"};
     if (row.items)
       Object.assign(axis, {tickvals: Object.keys(row.items).map(Number), ticktext: Object.values(row.items).map(tidy)});
     return axis;
@@ -93,8 +95,6 @@
 
   const floats = bdata => page.array({dtype: "f4", bdata});
 
-  const axesOf = figure => Object.keys(figure.layout).filter(k => k.startsWith("yaxis")).length;
-
   function show() {
     if (!div) {
       div = document.createElement("div");
@@ -103,7 +103,7 @@
     }
     const figure = figureOf([...chosen]);
     about.replaceChildren(...[...chosen].map(name => byName.get(name)).filter(s => s.about).map(describe));
-    div.dataset.height = HEIGHT * axesOf(figure) + 20;
+    div.dataset.height = figure.layout.meta.height;
     div.style.height ||= div.dataset.height + "px";
     return page.draw(div, figure);
   }

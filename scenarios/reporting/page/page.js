@@ -93,7 +93,7 @@ const page = (() => {
   // Stands a line at the cursor's time in a plot over time. It lies over the plot, since Plotly takes long to draw one.
   function mark(div) {
     if (!clocks.length || !figures.get(div).layout.meta?.time || !div._fullLayout) return;
-    const {xaxis: x, yaxis: y} = div._fullLayout;
+    const {xaxis: x, _size: all} = div._fullLayout;
     let line = div.querySelector(".cursor");
     if (!line) {
       line = document.createElement("i");
@@ -102,7 +102,7 @@ const page = (() => {
     }
     const at = x.l2p(cursor);
     line.hidden = cursor === null || !(at >= 0 && at <= x._length);
-    Object.assign(line.style, {left: `${x._offset + at}px`, top: `${y._offset}px`, height: `${y._length}px`});
+    Object.assign(line.style, {left: `${x._offset + at}px`, top: `${all.t}px`, height: `${all.h}px`});
   }
 
   // Lets a figure show the range of time that was chosen in one of them; all heights are theirs.
@@ -123,12 +123,14 @@ const page = (() => {
 
   const LEAST_ROW = 66, MOST_ROW = 96, NAME = 38;  // heights of a list's row with its name above it, and of a name, pixels
 
-  // On a phone: few ticks, small margins, and the names of a list above its rows instead of beside them.
+  // On a phone: few ticks, small margins and letters, and the names of a list above its rows instead of beside them.
   function narrow(div, data, layout) {
     for (const key of Object.keys(layout).filter(k => /^[xy]axis\d*$/.test(k)))
       layout[key] = {nticks: key[0] === "x" ? 5 : 6, ...layout[key]};
     layout.margin = {l: 44, r: 6, t: 30, b: 40, ...layout.margin};
     layout.font = {size: 12, ...layout.font};
+    if (layout.meta?.time)  // the titles of panels
+      layout.annotations = layout.annotations?.map(title => ({...title, xshift: -36, font: {...title.font, size: 13}}));
     if (layout.meta?.list) {
       const {tickvals, ticktext} = layout.yaxis;
       const spread = Math.max(0, ...data.flatMap(({y = []}) => Array.from(array(y), v => Math.abs(v - Math.round(v)))));
@@ -211,6 +213,7 @@ const page = (() => {
   document.addEventListener("DOMContentLoaded", drawAll);  // when the page's other scripts have run
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", recolour);
   matchMedia("print").addEventListener("change", recolour);
+  addEventListener("beforeprint", () => { for (const part of document.querySelectorAll("details.printed")) part.open = true; });
   return {
     colours, draw, array, data, typeset, setTime, onTime: act => clocks.push(act),
     onColours: act => listeners.push(act), onDraw: act => changes.push(act), onReady: act => starts.push(act),

@@ -1,7 +1,7 @@
 // Shades the phases of time plots and names them: `layout.meta.phases` is a list of {from, to, name}. Names are level
 // where they fit; a name that fits nowhere stands once, upright, over its longest phase (as in plotting.py). In a plot with
-// data-brief, which has neither height to spare nor buttons, such a name is level where it is not much wider than its phase
-// and meets no other, and else missing.
+// data-brief or `layout.meta.brief`, which has no height to spare, such a name is level where it is not much wider than its
+// phase and meets no other, and else missing.
 "use strict";
 (() => {
   const LETTER = 6.6, UPRIGHT = 15, MARGINS = 70, BUTTONS = 150, HIGH = 22;  // px
@@ -14,14 +14,15 @@
     const spans = phases.filter(p => p.to > low && p.from < high);
     layout.shapes = [...(layout.shapes ?? []), ...phases.flatMap((p, k) => k % 2 ? [shade(p)] : [])];
     let up = 0, right = 0;  // px that the longest upright name takes, and from the left how far names reach
-    const brief = "brief" in div.dataset;
+    const isBare = "brief" in div.dataset, brief = isBare || layout.meta.brief;
+    const end = (high - low) * pixels - (isBare ? 0 : BUTTONS);  // Plotly's buttons come over what stands right of it
     const {level, upright} = named(spans, low, high, pixels);
     if (brief) {
       const reach = p => LETTER * p.name.length / 2 + 3;  // to either side of its middle
       for (const p of upright.splice(0)) {
         const [from, to] = [p.middle * pixels - reach(p), p.middle * pixels + reach(p)];
         const isFree = level.every(other => Math.abs(other.middle - p.middle) * pixels >= reach(other) + reach(p));
-        if (reach(p) <= p.long * pixels && from >= 0 && to <= (high - low) * pixels && isFree) level.push(p);
+        if (reach(p) <= p.long * pixels && from >= 0 && to <= end && isFree) level.push(p);
       }
     }
     const put = (p, angle, wide) => {
@@ -36,7 +37,7 @@
         return put(p, -90, UPRIGHT);
       }),
     ];
-    if (!brief && right > (high - low) * pixels - BUTTONS) up += HIGH;  // Plotly's buttons come over what stands there
+    if (!brief && right > end) up += HIGH;
     layout.margin = {...layout.margin, t: 30 + up};
     div.dataset.more = up;
   }

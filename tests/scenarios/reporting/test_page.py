@@ -1,5 +1,6 @@
-"""A page: what it is given cannot break out of it, and Plotly comes along only where something is drawn."""
+"""A page: nothing it is given breaks out of it, it has Plotly where something is drawn, and main metrics come first."""
 
+import re
 from pathlib import Path
 
 import plotly.graph_objects as go
@@ -9,6 +10,9 @@ from markupsafe import Markup
 from handover.cosim.exceptions import RecordNotWritten
 from handover.scenarios.reporting.html import plot_html
 from handover.scenarios.reporting.page import Section, write_page
+from handover.scenarios.reporting.run_page import metrics_section
+from handover.scenarios.results.run_facts import RunFacts
+from handover.scenarios.results.run_folder import RunFolder
 
 EVIL = "</script><script>alert(1)</script>"
 
@@ -40,3 +44,13 @@ def test_the_folder_of_a_page_is_made_and_a_page_that_cannot_be_written_leaves_n
     with pytest.raises(RecordNotWritten):
         page_of(tmp_path / "file", Markup(""))
     assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "no"]
+
+
+def test_the_metrics_of_the_headline_are_open_and_the_others_folded(grasp: Path):
+    facts = RunFacts.read(RunFolder.of_run(grasp))
+    section = metrics_section(facts)
+    assert section is not None
+    opened, folded = section.html.split("<details")
+    names = re.compile(r'class="soft name">(\w+)<')
+    assert names.findall(opened) == [name for name in facts.headline if name in facts.summary["metrics"]]
+    assert len(names.findall(folded)) == int(re.findall(r"<summary>(\d+) more", folded)[0]) > 0

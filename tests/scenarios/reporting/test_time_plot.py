@@ -1,5 +1,7 @@
 """What is drawn over time is described once: phases by name, colours by group, and names over figures for papers."""
 
+import json
+import re
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -14,7 +16,7 @@ from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.plotting import figure, name_phases
 from handover.scenarios.experiment.time_plot import COLOURS, Curve, Level, Phase, TimePlot, phases_of
-from handover.scenarios.reporting.time_plots import time_figure
+from handover.scenarios.reporting.time_plots import time_figure, time_plots_section
 
 
 @pytest.fixture
@@ -104,3 +106,34 @@ def test_a_signal_of_which_nothing_is_known_has_no_phases(tmp_path: Path):
     table = pa.Table.from_pydict({"time": np.arange(3.0), "servo.phase": np.full(3, np.nan)})
     pq.write_table(table, tmp_path / "s.parquet")
     assert phases_of(Record(tmp_path / "s.parquet"), "servo.phase") == ()
+
+
+def plot(title: str, *labels: str, phases: tuple[Phase, ...] = (), unit: str = "mm") -> TimePlot:
+    curves = [Curve(label=label, values=np.arange(3.0)) for label in labels]
+    return TimePlot(title=title, quantity=title, unit=unit, curves=curves, phases=phases)
+
+
+PHASES = (Phase(begin=0.0, end=1.5, name="wait"), Phase(begin=1.5, end=2.0, name="look"))
+
+
+def test_plots_of_one_legend_are_panels_of_one_figure_which_names_their_phases_once():
+    of_robot = [plot(name, "hand", "object", phases=PHASES) for name in "xyz"]
+    others = [plot("speed", "true", phases=PHASES), plot("force", "true", phases=PHASES[:1])]
+    section = time_plots_section([*of_robot, *others, *of_robot[:1]], np.arange(3.0))
+    assert section is not None
+    figures = [json.loads(text) for text in re.findall(r'<script type="application/json">(.*?)</script>', section.html)]
+    assert [f["layout"]["meta"]["brief"] for f in figures] == [False, True, False, True]
+    layout, traces = figures[0]["layout"], figures[0]["data"]
+    assert [layout[axis]["title"]["text"] for axis in ("yaxis", "yaxis2", "yaxis3")] == ["x (mm)", "y (mm)", "z (mm)"]
+    assert layout["xaxis"]["anchor"] == "y3"
+    assert [(t["name"], t["yaxis"]) for t in traces if t["showlegend"]] == [("hand", "y"), ("object", "y")]
+    assert [t["yaxis"] for t in traces] == ["y", "y", "y2", "y2", "y3", "y3"]
+    assert [a["text"] for a in layout["annotations"]] == ["y", "z"]
+    (z, y, x) = sorted(layout[axis]["domain"] for axis in ("yaxis", "yaxis2", "yaxis3"))
+    assert 0.0 <= z[0] < z[1] < y[0] < y[1] < x[0] < x[1] == 1.0
+
+
+def test_a_figure_has_a_few_panels_at_most():
+    section = time_plots_section([plot(f"output {k}", f"output {k}", unit="") for k in range(13)], np.arange(3.0))
+    assert section is not None
+    assert section.html.count('class="plot"') == 3
