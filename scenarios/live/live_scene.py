@@ -237,10 +237,13 @@ class LiveScene:
         return HandSample(p, q_WH, angles, closed=bool(self._record[names[3]][-1]), stamp=self.time)
 
     def _plot_of(self, signal: str) -> TimePlot:
-        elements = list(elements_of(signal, self._history[signal].astype(np.float64)).items())[:_MAX_CURVES]
-        curves = [Curve(label=name, values=values) for name, values in elements]
+        values, is_named = self._history[signal], bool(self._history.items(signal))
+        held, phases = values.dtype.kind != "f", phases_of(self._history, signal) if is_named else ()
+        elements = list(elements_of(signal, values.astype(np.float64)).items())[:_MAX_CURVES]
+        curves = [Curve(label=name, values=element, held=held) for name, element in elements]
         quantity = self._history.description(signal) or signal
-        return TimePlot(title=signal, quantity=quantity, unit=unit_symbol(self._history.unit(signal)), curves=curves)
+        unit = unit_symbol(self._history.unit(signal))
+        return TimePlot(title=signal, quantity=quantity, unit=unit, curves=curves, phases=phases)
 
     def _replay(self) -> Replay | None:
         with self._faults.tolerated("the scene"):

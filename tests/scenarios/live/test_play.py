@@ -55,6 +55,7 @@ def test_a_slider_begins_a_run_anew_and_a_run_is_that_of_its_command_is_shown_ag
             begun(page, 1)
             frames_come(page)
             refusals_are_told_beside_their_fields(page)
+            a_plot_of_choice_is_drawn_beside_the_scene(page)
             where = page.evaluate("live.scene.viewpoint()")
             page.get_by_label("force, slider", exact=True).fill("12")
             begun(page, 2)
@@ -92,6 +93,14 @@ def test_a_slider_begins_a_run_anew_and_a_run_is_that_of_its_command_is_shown_ag
     assert command == "handover run flyer_impedance -p force=12"
     again = kept_run("run", "flyer_impedance", "-p", "force=12", "--no-report") / "signals.parquet"
     assert (tmp_path / "runs/002/signals.parquet").read_bytes() == again.read_bytes()
+
+
+def a_plot_of_choice_is_drawn_beside_the_scene(page: Page) -> None:
+    titles = page.locator("#plot-choice option").all_inner_texts()
+    page.locator("#plot-choice").select_option(titles[-1])
+    wait_until(page, "document.querySelector('#plot-beside .main-svg') !== null")
+    assert page.locator("#plot-beside h3").text_content() == titles[-1]
+    assert page.locator("#plots h3").all_text_contents() == titles[:-1]
 
 
 def refusals_are_told_beside_their_fields(page: Page) -> None:

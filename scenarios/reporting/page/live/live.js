@@ -19,6 +19,8 @@ const live = (() => {
     scene: null, run: null, session: false, send, on(name, act) { (listeners[name] ??= []).push(act); }, get hand() { return lead?.hand; },
     get isUnderWay() { return Boolean(api.run) && !over && !isLost; },
   };
+  const beside = byId("plot-beside"), choice = byId("plot-choice");  // in a session: a plot of choice beside the scene
+  let parts = [], wanted = "";  // plots with their headings; the title of the one beside the scene
   let hints = null, viewport = null, slots = [], size = 0, paused = true, link = null, over = false, isLost = false, lead = null, side = null;
 
   // Puts the scene of a run in the place of the one before, seen from where that was seen, unless a hand is led only now.
@@ -172,18 +174,32 @@ const live = (() => {
 
   // Draws those plots that are seen; the server sends no others, since drawing takes long.
   function drawPlots(figures) {
-    let moved = false;
-    figures.forEach(({title, figure}, i) => {
-      const left = [...plots.children].slice(i);
-      const part = left.find(({firstChild}) => firstChild.textContent === title) ?? createPlot(title);
-      if (part !== left[0]) {
-        plots.insertBefore(part, left[0] ?? null);
-        moved = true;
-      }
-      if (figure) page.draw(part.lastChild, JSON.parse(figure));
+    const before = parts, left = [...parts];
+    parts = figures.map(({title}) => {
+      const k = left.findIndex(part => titleOf(part) === title);
+      return k < 0 ? createPlot(title) : left.splice(k, 1)[0];
     });
-    while (plots.children.length > figures.length) plots.lastChild.remove();
-    if (moved) sendSeen();
+    for (const part of left) part.remove();
+    if (left.length || parts.some((part, i) => part !== before[i])) arrange();
+    figures.forEach(({figure}, i) => { if (figure) page.draw(parts[i].lastChild, JSON.parse(figure)); });
+  }
+
+  const titleOf = part => part.firstChild.textContent;
+
+  // Puts the wanted plot beside the scene where the page has a place for it, and the others below.
+  function arrange() {
+    const near = beside ? parts.find(part => titleOf(part) === wanted) ?? parts[0] : undefined;
+    parts.filter(part => part !== near).forEach((part, i) => {
+      delete part.lastChild.dataset.brief;
+      if (plots.children[i] !== part) plots.insertBefore(part, plots.children[i] ?? null);
+    });
+    if (beside) {
+      if (near) near.lastChild.dataset.brief = "";
+      if (near !== beside.firstChild) beside.replaceChildren(...near ? [near] : []);
+      choice.replaceChildren(...parts.map(part => new Option(titleOf(part), undefined, false, part === near)));
+      choice.closest("section").hidden = !near;
+    }
+    sendSeen();
   }
 
   const shown = new Set();
@@ -193,7 +209,7 @@ const live = (() => {
   });
 
   function sendSeen() {
-    send("see", [...shown].map(part => [...plots.children].indexOf(part)).filter(i => i >= 0));
+    send("see", [...shown].map(part => parts.indexOf(part)).filter(i => i >= 0));
   }
 
   function endRun({judged, success, reason, report, again}) {
@@ -220,9 +236,12 @@ const live = (() => {
   function chooseSignal(name) {
     if (!name || !api.run) return;
     const isThere = api.run.signals.includes(name);
-    byId("told").textContent = isThere ? `The plot of ${name} is the first one below.`
+    byId("told").textContent = isThere ? `The plot of ${name} is ${beside ? "beside the scene" : "the first one below"}.`
       : `There is no signal ${name}; those of the run are offered as one types.`;
-    if (!isThere || chosen.includes(name)) return;
+    if (!isThere) return;
+    wanted = name;
+    byId("signal").value = "";
+    if (chosen.includes(name)) return arrange();
     chosen.unshift(name);
     const chip = document.createElement("button");
     chip.type = "button";
@@ -233,12 +252,15 @@ const live = (() => {
       send("choose", chosen);
     });
     byId("chosen").prepend(chip);
-    byId("signal").value = "";
     send("choose", chosen);
   }
 
   byId("hand-side-view").addEventListener("change", ({target}) => { if (side) side.shown = target.checked; });
   byId("signal").addEventListener("change", ({target}) => chooseSignal(target.value));
+  choice?.addEventListener("change", () => {
+    wanted = choice.value;
+    arrange();
+  });
   byId("pause").addEventListener("click", () => send(paused ? "go" : "pause"));
   byId("step").addEventListener("click", () => send("step"));
   byId("stop").addEventListener("click", () => send("stop"));
