@@ -17,7 +17,7 @@ def claims_section(claims: Sequence[Claim]) -> Section | None:
     """Return the table of claims with their verdicts, this project's own below; None if there are none."""
     parts: list[Markup] = []
     for beyond, title, header in ((False, "", _HEADER), (True, "Beyond the paper", _HEADER_BEYOND)):
-        rows = [_row(c, header) for c in claims if c.beyond is beyond]
+        rows = [_rows(c, header) for c in claims if c.beyond is beyond]
         if rows:
             heads = Markup().join(Markup("<th scope='col'>{}</th>").format(h) for h in header)
             heading = Markup("<h3>{}</h3>").format(title) if title else Markup()
@@ -31,7 +31,7 @@ def verdict_html(verdict: Verdict, words: str) -> Markup:
     return Markup("<b class='{}'>{}</b>").format(_COLOURS[verdict], words)
 
 
-def _row(claim: Claim, header: Sequence[str]) -> Markup:
+def _rows(claim: Claim, header: Sequence[str]) -> Markup:
     where = Markup("<br><span class='soft'>{}</span>").format(claim.where) if claim.where else Markup()
     verdict = verdict_html(claim.verdict, claim.verdict_text)
     cells = {
@@ -39,7 +39,7 @@ def _row(claim: Claim, header: Sequence[str]) -> Markup:
         "published": claim.published,
         "ours": claim.measured,
         "95 % interval": claim.interval_text,
-        "verdict": Markup("{}<br><span class='soft'>{}</span>").format(verdict, claim.reason),
+        "verdict": verdict,
     }
     text = Markup().join(
         Markup("<td data-label='{}'{}>{}</td>").format(
@@ -47,7 +47,8 @@ def _row(claim: Claim, header: Sequence[str]) -> Markup:
         )
         for name in header
     )
-    return Markup("<tr>{}</tr>").format(text)
+    why = Markup("<tr class='why'><td colspan='{}'>{}</td></tr>").format(len(header), claim.reason)
+    return Markup("<tr>{}</tr>").format(text) + why
 
 
 def comparison_section(tables: Sequence[ComparisonTable]) -> Section | None:
