@@ -48,7 +48,7 @@ class Disturbances:
     finger_friction: Number = parameter(
         0.8, "friction between the gripper's fingers and the ball", minimum=0.0, maximum=3.0
     )
-    hand_force_max: Newton = parameter(5.0, "force on the hand that the person bears", minimum=0.1, maximum=1000.0)
+    hand_force_max: Newton = parameter(5.0, "force on the hand that the person tolerates", minimum=0.1, maximum=1000.0)
     help_speed: MetrePerSecond = parameter(
         0.0,
         "how fast the person brings the ball between the fingers of a gripper that closes; 0: holds it still",

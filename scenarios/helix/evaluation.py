@@ -23,7 +23,7 @@ from handover.scenarios.helix.marked_pictures import is_covered, take_pictures
 from handover.scenarios.helix.parameters import Parameters
 
 FIG_9_RESOLUTION = 0.01
-"""To which the thesis tells the lengths of fig. 9, m."""
+"""To which the thesis gives the lengths of fig. 9, m."""
 
 
 class ModelMismatch(NamedTuple):
@@ -297,7 +297,9 @@ class HandoverEvaluator(Evaluator):
             return f"{self._why_given_up()}: the gripper stays {self._error:.3f} m from its goal; {where}"
         if self._is_pressed:
             most = self.parameters.hand_force_max
-            return f"the arm pressed on the hand with {self._pressing:.1f} N, and a person bears {most:g} N; {where}"
+            return (
+                f"the arm pressed on the hand with {self._pressing:.1f} N, and a person tolerates {most:g} N; {where}"
+            )
         if self._released_at is not None:
             return f"the ball left the hand at {self._released_at:.1f} s, and the gripper did not keep it; {where}"
         if self._holder == "FREE":

@@ -60,7 +60,7 @@ PLACES = {
                     *("cover_left_from", "cover_left_until", "cover_right_from", "cover_right_until", "light", "noise"),
                     *("lost_pictures", "covered_markers", "hide_ball_from", "hide_ball_until"),
                 ),
-                "what the scenario's parameters let be amiss",
+                "the scenario's disturbances",
             ),
         },
         remarks=(_BASE, "In a camera's frame C, z is its direction of view, x points to the right and y down."),
@@ -116,7 +116,7 @@ PLACES = {
             "Calibrated, the arm hangs straight with segments of 0.12, 0.24 and 0.24 m, tendons 0.035 m from its axis; "
             "the gripper is 0.1 m beyond. With Dx and Dy a segment's rotation, rad, towards x and y of B, and l its "
             "length, m, the tendon at angle s has the length l - 0.035 (Dx cos s + Dy sin s).",
-            "Without phase, the gripper itself tells when it begins to close (closure above 0) and when it has closed; "
+            "Without phase, the gripper itself gives when it begins to close (closure above 0) and when it has closed; "
             "without error, the distance of gripper and ball is taken for it. Without closure it stays open.",
         ),
     ),
@@ -192,8 +192,8 @@ _FINGERS = {
 }
 _CORRECTED = {
     "p_WO": "in W; where the servo is to take the ball to be",
-    "p_WR": "in W; likewise the wrist",
-    "p_WG": "in W; likewise the gripper",
+    "p_WR": "in W; where the servo is to take the wrist to be",
+    "p_WG": "in W; where the servo is to take the gripper to be",
     "known_O": "whether the servo is to take p_WO",
     "known_R": "whether the servo is to take p_WR and p_WG",
 }

@@ -186,7 +186,7 @@ def _hand_force(parameters: Parameters, record: Record, phases: Sequence[Phase])
         phases=phases,
         limits=(0.0, None),
         curves=[Curve(label="of ball and fingers", values=force)],
-        levels=(Level(label="what the person bears", value=most),) if force.max() > 0.5 * most else (),
+        levels=(Level(label="what the person tolerates", value=most),) if force.max() > 0.5 * most else (),
     )
 
 

@@ -68,7 +68,7 @@ class ReflexGraspParameters:
         0.03, "standard deviation of a sensor's direction from the design's, in each of two", minimum=0.0, maximum=0.3
     )
     palm_reflectivity: Number = parameter(
-        0.6, "reflectivity of the palm likewise; the reflex expects 0.6", minimum=0.0, maximum=2.0
+        0.6, "reflectivity of the palm in infrared; the reflex expects 0.6", minimum=0.0, maximum=2.0
     )
     expected_radius: Metre = parameter(
         0.025, "radius of the ball that the reflex expects; it has 25 mm", minimum=0.005, maximum=0.1

@@ -49,7 +49,7 @@ def rate_claim(claim: str, where: str, published: tuple[int, int], measured: tup
     low, high = compatible_counts(*published, n)
     power = f"any count of ours from {low} to {high} of {n} would have passed"
     if (low, high) == (0, n):
-        power = f"with so few trials no count of ours out of {n} could have been told from theirs"
+        power = f"with so few trials no count of ours out of {n} would have differed from theirs"
     reason = (
         f"Reproduced if Fisher's exact test of both counts does not reject at {format_share(LEVEL)} that the rates are "
         f"equal: p = {format_p_value(p)}. Their own interval is {format_interval(theirs.low, theirs.high)}; {power}."

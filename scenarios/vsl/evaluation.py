@@ -217,7 +217,7 @@ class PathEvaluator(Evaluator):
         if self.points[0].mismatch is not None:
             metrics["model_mismatch"] = self._mean(
                 lambda p: float(bool(p.mismatch)),
-                "share of points at which a sensor told that the arm is not the one that was learned from",
+                "share of points at which a sensor showed that the arm is not the one that was learned from",
                 "1",
             )
         visited = f"points visited of the path's {self.parameters.points_in_all}"

@@ -117,10 +117,12 @@ class Parameters:
     EI_factor: Number = parameter(
         1.0, "bending stiffness of both links over that of the arm that was trained on", minimum=0.1, maximum=10.0
     )
-    mass_factor: Number = parameter(1.0, "mass of both links likewise", minimum=0.0, maximum=10.0)
-    friction_factor: Number = parameter(1.0, "friction of all gears likewise", minimum=0.0, maximum=100.0)
+    mass_factor: Number = parameter(1.0, "mass of both links over that of the trained arm", minimum=0.0, maximum=10.0)
+    friction_factor: Number = parameter(
+        1.0, "friction of all gears over that of the trained arm", minimum=0.0, maximum=100.0
+    )
     joint_factor: Number = parameter(
-        1.0, "stiffness of J2 and J3 behind their encoders likewise", minimum=0.01, maximum=1e3
+        1.0, "stiffness of J2 and J3 behind their encoders over that of the trained arm", minimum=0.01, maximum=1e3
     )
     arm_scatter: Number = parameter(
         0.0,
@@ -264,9 +266,9 @@ class HybridParameters(Parameters):
     )
     model: str = parameter("", "file of a trained model; empty: the one that ships")
     friction_compensation: bool = parameter(
-        False, "whether the direction of motion tells the gears' friction from the load"
+        False, "whether the direction of motion separates the gears' friction from the load"
     )
-    closed_loop: bool = parameter(False, "whether the tracker, too, tells the controller where the tip is")
+    closed_loop: bool = parameter(False, "whether the controller also gets the tip's position from the tracker")
     imu: Imu = parameter(
         Imu.NONE, "IMUs at the links' ends: none, to monitor what was learned, or feedback by them, too"
     )

@@ -39,7 +39,7 @@ class PickAndPlaceParameters:
         np.array([0.30, 0.0, 0.06]), "top of the object at the start in W", minimum=-1.0, maximum=1.0
     )
     place: Vector3[Metre] = parameter(
-        np.array([0.36, 0.0, 0.06]), "where it is to be put down, likewise; as high as pick", minimum=-1.0, maximum=1.0
+        np.array([0.36, 0.0, 0.06]), "where it is to be put down, in W; as high as pick", minimum=-1.0, maximum=1.0
     )
     contact_pressure: Pascal = parameter(
         5e4, "pressure in both links near contacts: 5e4 Pa is 0.5 bar", minimum=0.0, maximum=MAX_PRESSURE

@@ -37,7 +37,7 @@ def figures_of_team(parameters: TeamParameters, record: Record) -> list[TimeFigu
         ),
         TimeFigure(
             name="forces",
-            caption="Forces on grippers, shaded by which of them hold the object, and on hands, likewise; and the part "
+            caption="Forces on grippers, shaded by which of them hold the object, and the same on hands; and the part "
             "of the grippers' forces that cancels along the line between them.",
             plots=_forces(record, hands),
         ),

@@ -152,9 +152,9 @@ def _hands_over(rows: ControllerRows, controller: str) -> Claim:
     found = [row for t in Task for b in Behaviour for p in PROPULSIONS for row in rows.of(controller, t, b, p)]
     claim = f"With the {CONTROLLERS[controller]} control every handover succeeds"
     telling = [t for t in Task if (of := _coasted(rows, t)) and not succeeded(of)]
-    note = "No task is known to fail without thrust, so that success tells nothing of the controller."
+    note = "No task is known to fail without thrust, so that success says nothing about the controller."
     if telling:
-        note = f"Without thrust no run of {' and '.join(TASKS[t] for t in telling)} succeeds: these tell of control."
+        note = f"Without thrust no run of {' and '.join(TASKS[t] for t in telling)} succeeds: these depend on control."
     return every_claim(claim, "", (0, 0), (succeeded(found), len(found)), f"{note} {unfinished_note(found)}".strip())
 
 
@@ -181,7 +181,7 @@ def _coasting(rows: ControllerRows) -> Claim:
         measured=f"{format_rate(succeeded(tried), len(tried))} succeeded",
         verdict=verdict_of(succeeded(tried) == 0, could_be_either=enough),
         reason=f"Holds if none succeeds. By task: {each}. Where a coasting robot succeeds, too, the successes of the "
-        f"controllers tell nothing of them.{needed} {unfinished_note(tried)}".strip(),
+        f"controllers say nothing about them.{needed} {unfinished_note(tried)}".strip(),
     )
 
 
@@ -226,8 +226,8 @@ def _late(rows: ControllerRows) -> Claim:
     delay = float(DISTURBANCES[0].parameters["delay"])
     radius = linear_loop(Behaviour.RIGID, float(paper_values("free_flyer", "thrusters")["lag"]), delay).pole_radius
     note = (
-        f"With this delay the rigid impedance loop has its largest pole at |z| = {radius:.3f}, so told of it the "
-        "controller does not start; where it is not told, limits of thrust keep a growing oscillation small. Share of "
+        f"With this delay the rigid impedance loop has its largest pole at |z| = {radius:.3f}, so given it the "
+        "controller does not start; where it is not given, limits of thrust keep a growing oscillation small. Share of "
         "the run for which more was commanded than the rigid robot's thrusters give: "
         f"{limited or 'not known'}; admittance and PID control clip their own commands. {unfinished_note(tried)}"
     )

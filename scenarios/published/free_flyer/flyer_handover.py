@@ -194,7 +194,7 @@ def _margins(runs: HandoverRuns) -> ComparisonTable:
         rows=rows,
         note="Speeds of the gripper as the robot sees it: the greatest in any run while it waits and nobody touches "
         "it, and those at which it took its motion for a touch, from least to greatest. Angles of the closed gripper "
-        f"with the object in it and without, which the robot tells apart at {np.degrees(beta):.1f}°; what they are is "
+        f"with the object in it and without, which the robot separates at {np.degrees(beta):.1f}°; what they are is "
         "assumed here.",
     )
 

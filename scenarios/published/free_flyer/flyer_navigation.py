@@ -59,7 +59,7 @@ class FlyerNavigation(PublishedExperiment):
     """
 
     name: ClassVar[str] = "flyer-navigation"
-    title: ClassVar[str] = "a free-flyer whose navigation errs hands over (beyond [Fernandes2020] sec. 4.1.2)"
+    title: ClassVar[str] = "a free-flyer with errors in its navigation hands over (beyond [Fernandes2020] sec. 4.1.2)"
     scenario: ClassVar[str] = HandoverOfTask.name
 
     def plan(self, quick: bool) -> CampaignPlan:

@@ -57,7 +57,7 @@ def claims_of_navigation(runs: NavigationRuns) -> list[Claim]:
 
 def _estimate(runs: NavigationRuns) -> Claim:
     facts: dict[str, Any] = {
-        "claim": "The robot's own filter tells its pose and velocity well enough for handovers",
+        "claim": "The robot's own filter estimates its pose and velocity well enough for handovers",
         "published": "all handovers succeed, in its simulation",
         "where": "secs. 4.1.1, 4.1.2, 4.3",
     }

@@ -204,7 +204,7 @@ def _agrees(found: _Map) -> Claim:
         "unit circle left out",
         verdict=verdict_of(agree == len(clear) and not found.lost, could_be_either=either),
         reason=f"Holds if all do whose largest pole is more than {_MARGIN:g} from the unit circle. Nearer to it a run "
-        f"of half a minute cannot tell its side: {len(near)} of {len(compared)} runs are left out, of which "
+        f"of half a minute cannot show its side: {len(near)} of {len(compared)} runs are left out, of which "
         f"{sum(said is rests for said, rests in near)} agree. Runs that diverged until a unit failed, "
         f"{found.diverged}, count as not at rest; {found.lost} were lost.",
     )

@@ -131,7 +131,7 @@ def _halves(arm: Helix1Runs, small: float, large: float) -> Claim:
         interval=interval,
         verdict=Verdict.NOT_COMPARABLE if halves and stays else verdict,
         reason=f"Reproduced if the bootstrap's interval of the ratio of medians holds {half:g} and not 1; not "
-        f"comparable if it holds both, as the runs are then too few to tell.{missing(arm, small, large)}",
+        f"comparable if it holds both, as the runs are then too few.{missing(arm, small, large)}",
     )
 
 
@@ -156,7 +156,7 @@ def _halves_unevenly(arm: Helix1Runs) -> Claim:
         interval=(low, high),
         verdict=Verdict.NOT_COMPARABLE if undecided else (Verdict.REPRODUCED if low > 1.0 else Verdict.NOT_REPRODUCED),
         reason="Reproduced if the bootstrap's interval of the first ratio over the second lies above 1; not comparable "
-        f"if it holds both 1 and the published {ratio:.2f}, as the runs are then too few to tell."
+        f"if it holds both 1 and the published {ratio:.2f}, as the runs are then too few."
         f"{missing(arm, *arm.alphas)}",
     )
 

@@ -156,7 +156,7 @@ def _starts_off(curves: Curves) -> Claim:
         unit="m",
         verdict=Verdict.REPRODUCED if interval.low > FIG_9_RESOLUTION else Verdict.NOT_REPRODUCED,
         reason=f"Reproduced if the interval of the mean lies above {1e3 * FIG_9_RESOLUTION:.0f} mm, to which the "
-        "thesis tells the lengths of fig. 9. Here the tendons' zeros are exact: the arm hangs as its model does, and "
+        "thesis gives the lengths of fig. 9. Here the tendons' zeros are exact: the arm hangs as its model does, and "
         "what is left are the cameras' calibration and the measurement.",
     )
 
@@ -207,7 +207,7 @@ def _alike(curves: Curves) -> Claim:
         measured=", ".join(f"{1e3 * m:.0f}" for m in means) + f" mm (α = {', '.join(map(str, alphas))})",
         verdict=Verdict.REPRODUCED if np.ptp(means) <= _SIMILAR else Verdict.NOT_REPRODUCED,
         reason=f"Reproduced if the means over the runs differ by no more than {1e3 * _SIMILAR:.0f} mm, twice the "
-        "resolution to which the thesis tells such lengths.",
+        "resolution to which the thesis gives such lengths.",
     )
 
 

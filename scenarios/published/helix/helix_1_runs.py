@@ -106,7 +106,7 @@ def published() -> dict[str, Any]:
 
 def too_few(facts: dict[str, Any], what: str) -> Claim:
     """Return a claim, given by its fields without a result, as not comparable for too few runs."""
-    return nothing_measured(**facts, reason=f"Too few runs to tell: {what}.")
+    return nothing_measured(**facts, reason=f"Too few runs: {what}.")
 
 
 def missing(arm: Helix1Runs, *alphas: float) -> str:

@@ -1,4 +1,4 @@
-"""What spreads the times at the step size 0.1: one thing amiss at a time, with the thesis's settings at its places.
+"""What spreads the times at the step size 0.1: one disturbance at a time, with the thesis's settings at its places.
 
 [Vervloet2025] table 1 has 42.9 to 214.9 s at this step size, far more than at the others, and does not say why. That
 halving the step size does not double the times exactly, sec. 5.1 ascribes to "the set of inaccuracies present in the
@@ -124,11 +124,11 @@ def spread_table(table: CampaignTable) -> list[ComparisonTable]:
         ComparisonTable(
             title="What spreads the times at step size 0.1",
             header=[
-                *("amiss", "size", "gripper began to close", "ball taken", "time, median (range), s"),
+                *("disturbance", "size", "gripper began to close", "ball taken", "time, median (range), s"),
                 *("mean, s", "p, mean", "p, spread"),
             ],
             rows=[first, *(_row(case, rows) for case, rows in found.items())],
-            note="One thing amiss at a time, with the thesis's settings at its four places. p: of Welch's test that "
+            note="One disturbance at a time, with the thesis's settings at its four places. p: of Welch's test that "
             "the mean, and of the F test that the standard deviation is the published one, of the published "
             "eight runs and ours; small where it cannot be. The F test takes times as normally distributed.",
         )
@@ -141,7 +141,7 @@ def spread_claims(table: CampaignTable) -> list[Claim]:
     if not found:
         return []
     facts: dict[str, Any] = {
-        "claim": "Some one thing amiss makes the times at step size 0.1 come out as published",
+        "claim": "One of the disturbances makes the times at step size 0.1 those published",
         "published": "",
         "beyond": True,
     }
@@ -155,14 +155,14 @@ def spread_claims(table: CampaignTable) -> list[Claim]:
             measured=", ".join(case.label for case in alike) or f"none of {len(enough)}",
             verdict=Verdict.REPRODUCED if alike else Verdict.NOT_REPRODUCED,
             reason="Holds if there is a case in which the gripper begins to close in every run, and neither Welch's "
-            "test of the means nor the F test of the standard deviations tells its times from the published ones, "
+            "test of the means nor the F test of the standard deviations separates its times from the published ones, "
             f"{published()['arm_time_mean'][0]} ± {published()['arm_time_std'][0]} s; each at its own 5 %.",
         )
     ]
 
 
 def draw_spread(table: CampaignTable, folder: Path) -> list[Figure]:
-    """Draw every run's time by what is amiss, beside the published range; nothing without such runs."""
+    """Draw every run's time by disturbance, beside the published range; nothing without such runs."""
     found = spread_rows(table)
     if not found:
         return []
@@ -184,7 +184,7 @@ def draw_spread(table: CampaignTable, folder: Path) -> list[Figure]:
         axes.plot([], [], "x", ms=5, color=COLOURS[1], label="ball not taken")
         axes.figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=2)
     caption = (
-        "Times at the step size 0.1 with one thing amiss at a time, with the thesis's settings, beside those that the "
+        "Times at the step size 0.1 with one disturbance at a time, with the thesis's settings, beside those that the "
         "thesis has. Runs in which the gripper never began to close are not there."
     )
     return [Figure("spread", caption)]

@@ -139,7 +139,7 @@ def _faster(runs: GuidedRuns) -> Claim:
     }
     guided, alone = _times(runs.guided), _times(runs.alone)
     if not len(guided) or not len(alone):
-        return nothing_measured(**facts, reason=f"Too few runs to tell: {len(guided)} guided, {len(alone)} not.")
+        return nothing_measured(**facts, reason=f"Too few runs: {len(guided)} guided, {len(alone)} not.")
     least, p = _p_value(np.zeros(len(guided)), np.ones(len(alone))), _p_value(guided, alone)
     holds = p < LEVEL and float(np.median(guided)) < float(np.median(alone))
     short = f" With so few runs p cannot be less than {format_p_value(least)}." if least >= LEVEL else ""

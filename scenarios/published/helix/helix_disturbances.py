@@ -1,4 +1,4 @@
-"""What the Helix bears: one thing amiss at a time, at the same places and seeds, until the handover fails.
+"""What the Helix tolerates: one disturbance at a time, at the same places and seeds, until the handover fails.
 
 [Vervloet2025] has no such experiment; sec. 5.4 names camera places, filters and step rules as what could be changed.
 """
@@ -77,7 +77,7 @@ class HelixDisturbances(PublishedExperiment):
     """
 
     name: ClassVar[str] = "helix-disturbances"
-    title: ClassVar[str] = "the Helix with one thing amiss at a time, until it fails (beyond [Vervloet2025])"
+    title: ClassVar[str] = "the Helix with one disturbance at a time, until it fails (beyond [Vervloet2025])"
     scenario: ClassVar[str] = "helix_handover"
 
     def plan(self, quick: bool) -> CampaignPlan:
@@ -95,7 +95,7 @@ class HelixDisturbances(PublishedExperiment):
         )
 
     def claims(self, table: CampaignTable) -> Sequence[Claim]:
-        """Judge whether mild disturbances are borne, and how near the gripper ends."""
+        """Judge whether mild disturbances are tolerated, and how near the gripper ends."""
         runs = [row for case, rows in rows_by_case(table, CASES).items() if case.mild for row in rows]
         taken = [row for row in runs if row["success"]]
         return [_bears(runs), ends_near("With a mild disturbance", taken)]
@@ -105,9 +105,9 @@ class HelixDisturbances(PublishedExperiment):
         rows = [_row(case, rows) for case, rows in rows_by_case(table, CASES).items() if rows]
         return [
             ComparisonTable(
-                title="One thing amiss at a time",
+                title="One disturbance at a time",
                 header=[
-                    "amiss",
+                    "disturbance",
                     "size",
                     "success",
                     "closes at, mm",
@@ -136,7 +136,7 @@ class HelixDisturbances(PublishedExperiment):
             axes.plot([], [], "x", ms=5, color=COLOURS[1], label="it has not")
             axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
         caption = (
-            "Distance of gripper and ball at the end, by ground truth, with one thing amiss at a time: each point is a "
+            "Distance of gripper and ball at the end, by ground truth, with one disturbance at a time: each point is a "
             "handover, all at the same places."
         )
         return [Figure("disturbances", caption)]
@@ -156,7 +156,7 @@ def _row(case: Case, rows: Sequence[Mapping[str, Any]]) -> list[str]:
 
 def _bears(runs: Sequence[Mapping[str, Any]]) -> Claim:
     facts: dict[str, Any] = {
-        "claim": "The Helix bears each mild disturbance",
+        "claim": "The Helix succeeds with each mild disturbance",
         "published": "",
         "beyond": True,
     }

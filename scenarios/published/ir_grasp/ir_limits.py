@@ -113,7 +113,7 @@ def _no_worse(sentence: str, where: str, printed: str, held: Sequence[float], st
         return nothing_measured(sentence, where, printed)
     reason = (
         f"Reproduced if what is lost has an interval below {format_share(FEW)} of the scenes: of each, the share of "
-        f"levels that was not held, less 1 if it was not held with nothing amiss; the mean of {n} scenes is "
+        f"levels that was not held, less 1 if it was not held undisturbed; the mean of {n} scenes is "
         f"{format_share(float(lost.mean()))}, by {interval.method} over scenes up to {format_share(interval.high)}."
     )
     return Claim(
@@ -283,7 +283,7 @@ def _halves(runs: LimitRuns) -> ComparisonTable:
         title="Where a way falls below one half",
         header=["axis", "range", *(arm.title for arm in ARMS)],
         rows=rows,
-        note="Interpolated between levels. From the start: less than half is held where nothing is amiss yet, though "
+        note="Interpolated between levels. From the start: less than half is held without any disturbance, though "
         "it may be more farther on, as where the object comes nearer.",
     )
 

@@ -119,7 +119,7 @@ def _alike(runs: SensorRuns) -> Claim:
         published="only slightly",
         measured="; ".join(parts),
         verdict=Verdict.NOT_COMPARABLE,
-        reason=f"{_PUT_IN} Told by that part: the largest deviation of any constant from its mean, and of a curve from "
+        reason=f"{_PUT_IN} By that part: the largest deviation of any constant from its mean, and of a curve from "
         "that of the controller.",
         where=where,
     )
@@ -210,7 +210,7 @@ def _fits(runs: SensorRuns) -> ComparisonTable:
                 ]
             )
     note = (
-        "Medians over runs, by least squares in distance over 4 to 60 mm. Two exponentials are hard to tell apart: "
+        "Medians over runs, by least squares in distance over 4 to 60 mm. Two exponentials are hard to separate: "
         "constants differ more than curves do. Fits of a face that returns more or less are of another curve, since "
         "readings grow with what comes back. The last column: from the controller's curve, at readings of 100 to 3000."
     )

@@ -48,7 +48,7 @@ _FAILURE_SELECTED = (
 )
 
 _EASIER = (
-    "More successes than published tell of an easier task, not of a better hand: here it is planar, five simple shapes "
+    "More successes than published indicate an easier task, no better hand: here it is planar, five simple shapes "
     "slide on a table of even friction, nothing tips over, and the sensors follow the controller's own curve."
 )
 

@@ -46,12 +46,12 @@ def _successes(runs: IrTableRuns, perturbed: bool) -> ComparisonTable:
     rows = [[title, *_cells(runs, perturbed, thing)] for thing, title in _TITLES.items()]
     note = (
         "Intervals by Clopper and Pearson, 95 %; all runs of an arm count in the total. A star: Fisher's exact test "
-        f"tells ours from theirs at {format_share(LEVEL)}, of each cell by itself. The forward arms are a control that "
+        f"rejects equality at {format_share(LEVEL)}, of each cell by itself. The forward arms are a control that "
         "the paper does not have."
     )
     ours, theirs = runs.count(REFLEX, perturbed), runs.published(REFLEX, perturbed)
     if theirs is not None and ours[0] * theirs[1] > theirs[0] * ours[1]:
-        note += " That our IR-guided hand succeeds more often tells of an easier task."
+        note += " That our IR-guided hand succeeds more often indicates an easier task."
     if runs.not_done:
         note += f" {runs.not_done} runs did not come to their end and do not count."
     return ComparisonTable(

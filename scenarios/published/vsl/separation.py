@@ -58,14 +58,14 @@ class Comparison:
 
     @property
     def holds(self) -> bool:
-        """Whether each of the first group errs less than each of the second, of pairs than its own."""
+        """Whether each of the first group has less error than each of the second, of pairs than its own."""
         return self.margin > 0.0
 
 
 def separation_claim(
     claim: str, where: str, published: str, comparisons: Sequence[Comparison], *, beyond: bool = False
 ) -> Claim:
-    """Judge that, in all comparisons, each run of one group errs less than each of the other, of pairs than its own.
+    """Judge that, in all comparisons, one group has less error in each run, of pairs than its own.
 
     All comparisons are of groups, or all of pairs. Without enough runs of each group, it is not comparable.
     """
@@ -78,7 +78,7 @@ def separation_claim(
     paired = all(c.paired for c in found)
     rule = "in each run the one error is less than the other"
     if not paired:
-        rule = "each run of the one errs less than each of the other"
+        rule = "each run of the one has less error than each of the other"
     reason = f"{'Holds' if beyond else 'Reproduced'} if {every}{rule}."
     if every:
         reason += " A mean over all could hide one that goes the other way."

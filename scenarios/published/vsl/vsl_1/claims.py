@@ -24,7 +24,7 @@ _BY_CHOICE = (
     "proves nothing."
 )
 _RIGID_BY_CHOICE = (
-    "The stiffness of rigid links and of joints was chosen so that the rigid arm errs by some millimetres, as in "
+    "The stiffness of rigid links and of joints was chosen so that the rigid arm has errors of some millimetres, as in "
     "fig. 5, so agreement proves nothing."
 )
 _SERVO_BY_CHOICE = (
@@ -91,7 +91,7 @@ def _rigid(runs: Vsl1Runs) -> Claim:
         for load in runs.loads
         for links in runs.soft
     ]
-    claim = separation_claim("On soft links the tip errs more than on rigid ones.", _WHERE, "larger", comparisons)
+    claim = separation_claim("The tip's error is larger on soft links than on rigid.", _WHERE, "larger", comparisons)
     return without_verdict(claim, _RIGID_BY_CHOICE)
 
 

@@ -20,9 +20,9 @@ from handover.scenarios.published.vsl.vsl_2.runs import (
 )
 
 _RIGID_BY_CHOICE = (
-    "How far the rigid arm's joints yield is not given in the paper, and was chosen here so that it errs by some "
-    "millimetres, as in fig. 5: whether the hybrid errs less hangs on that. The claims beyond the paper say at which "
-    "stiffness it falls."
+    "How far the rigid arm's joints yield is not given in the paper, and was chosen here so that its errors are some "
+    "millimetres, as in fig. 5: whether the hybrid has less error depends on that. The claims beyond the paper say at "
+    "which stiffness it falls."
 )
 
 _NO_NETWORK = "The paper claims this of its network; `--model` takes the file of a trained one."
@@ -59,13 +59,13 @@ def _estimate(runs: Vsl2Runs, method: ControlMethod, by: str, *, beyond: bool = 
 
 def _command(runs: Vsl2Runs) -> Claim:
     comparisons = [_compared(runs, case, runs.hybrid, MODEL_BASED) for case in CASES]
-    sentence = "With the hybrid inverse model the tip errs less than with rigid kinematics."
+    sentence = "With the hybrid inverse model the tip's error is less than with rigid kinematics."
     return _by_network(runs, separation_claim(sentence, "sec. V-C, fig. 7(b)", "lower", comparisons))
 
 
 def _rigid(runs: Vsl2Runs) -> Claim:
     comparisons = [_compared(runs, case, runs.hybrid, RIGID) for case in CASES]
-    sentence = "With the hybrid inverse model the soft arm's tip errs less than that of an arm with rigid links."
+    sentence = "With the hybrid inverse model the soft arm's tip has less error than that of an arm with rigid links."
     return _by_network(runs, separation_claim(sentence, "sec. V-C, fig. 7(b)", "lower", comparisons), _RIGID_BY_CHOICE)
 
 
@@ -81,7 +81,7 @@ def _stiffer(runs: Vsl2Runs) -> list[Claim]:
     """Judge the claim against rigid arms with stiffer joints: it is told at which it falls."""
     return [
         separation_claim(
-            f"By {runs.hybrid.label} the soft arm's tip errs less than that of a rigid arm with joints {factor:g} "
+            f"By {runs.hybrid.label} the soft arm's tip has less error than that of a rigid arm with joints {factor:g} "
             "times as stiff as assumed.",
             "",
             "",
@@ -96,7 +96,7 @@ def _stiffer(runs: Vsl2Runs) -> list[Claim]:
 def _other_arms(runs: Vsl2Runs) -> list[Claim]:
     """Judge each method that was taught on arms that it was not taught on."""
     arms = f"each of the {len(runs.arms)} arms" if len(runs.arms) > 1 else "the one arm"
-    on = f"On {arms} tried from which nothing was learned the tip errs less by"
+    on = f"On {arms} tried from which nothing was learned the tip's error is less by"
     claims: list[Claim] = []
     pairs = [(case, arm) for case in CASES for arm in runs.arms]
     for method in runs.learned if pairs else ():
@@ -117,7 +117,7 @@ def _imus(runs: Vsl2Runs) -> list[Claim]:
     if IMU not in runs.feedback:
         return []
     comparisons = [_compared(runs, case, IMU, CUBIC, arm, arm) for case, arm in pairs]
-    sentence = "On each arm tried the tip errs less by polynomials with an IMU a link than by polynomials alone."
+    sentence = "On each arm tried the tip's error is less by polynomials with an IMU a link than by polynomials alone."
     return [separation_claim(sentence, "", "", comparisons, beyond=True)]
 
 

@@ -131,7 +131,7 @@ def _by_joints(runs: Vsl2Runs, folder: Path) -> Figure:
     caption = (
         "Mean error of an arm with rigid links by how many times its joints are stiffer than assumed, and that of the "
         "soft arm, with joints as assumed, by what was learned: means over the runs. The claim is that each run of the "
-        "latter errs less."
+        "latter has less error."
     )
     return Figure("rigid_joints", caption)
 

@@ -23,7 +23,7 @@ _RANKS = {MODEL_BASED: "most", RIGID: "between"}
 
 _OWN_LAW = (
     " The beam, of four fitted numbers, has the law of bending and the masses of the simulated arm itself: on a real "
-    "arm it would err more."
+    "arm its errors would be larger."
 )
 
 
@@ -73,12 +73,16 @@ def _rigid(runs: Vsl2Runs) -> ComparisonTable:
         title="What the claim against the rigid arm hangs on: mean errors (mm)",
         header=[
             "joints stiffer by",
-            *(text for case in CASES for text in (f"hybrid, {case.label}", f"rigid, {case.label}", "hybrid errs less")),
+            *(
+                text
+                for case in CASES
+                for text in (f"hybrid, {case.label}", f"rigid, {case.label}", "hybrid has less error")
+            ),
         ],
         rows=rows,
-        note="The rigid arm's links hardly bend; its tip errs as joints yield behind the encoder, by an assumed "
-        f"stiffness, and as servos droop; nothing corrects that, as in the paper. Hybrid: {runs.hybrid.label}. It errs "
-        "less where each of its runs does.",
+        note="The rigid arm's links hardly bend; its tip has errors as joints yield behind the encoder, by an assumed "
+        f"stiffness, and as servos droop; nothing corrects that, as in the paper. Hybrid: {runs.hybrid.label}. It has "
+        "less error where each of its runs has.",
     )
 
 
@@ -102,14 +106,14 @@ def _others(runs: Vsl2Runs) -> ComparisonTable:
             "arm",
             "load, pressure",
             *(method.label for method in methods),
-            "told as outside",
+            "outside the training",
             *(f"mismatch, {method.label}" for method in runs.feedback),
         ],
         rows=rows,
         note="Nothing was learned from the others. Arms of one kind differ in stiffness and mass of each link, "
-        f"friction of each gear and stiffness of each joint by {100 * SCATTER:g} % (standard deviation). Told as "
-        "outside: share of the points at which what was learned says that it is asked about what it was not taught "
-        "on, over all learned methods. Mismatch: share at which the controller tells by tracker or IMUs that the arm "
+        f"friction of each gear and stiffness of each joint by {100 * SCATTER:g} % (standard deviation). Outside "
+        "the training: share of the points at which the model reports inputs beyond those it was trained "
+        "on, over all learned methods. Mismatch: share at which the controller detects by tracker or IMUs that the arm "
         f"is another; without such a sensor that cannot be known.{_OWN_LAW if PHYSICS in methods else ''}",
     )
 

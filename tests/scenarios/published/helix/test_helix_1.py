@@ -201,7 +201,7 @@ DEFAULTS: dict[str, Any] = {"lost_pictures": 0.0, "tremor": 0.001, "drift": 0.00
 
 
 def table_with(amiss: Mapping[str, Any], times: Sequence[float | None]) -> CampaignTable:
-    """Return undisturbed runs and, at the smallest step size, such with something amiss."""
+    """Return undisturbed runs and, at the smallest step size, such with a disturbance."""
     same: dict[str, Any] = {**DEFAULTS, "servo.epsilon_control": float("nan")}
     disturbed = table_of({0.1: times}, **{**same, **amiss}).rows
     return made_table([*table_of(PLAIN, **same).rows, *({**row, "run": f"amiss_{row['run']}"} for row in disturbed)])

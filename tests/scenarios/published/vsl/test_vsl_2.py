@@ -67,9 +67,9 @@ ESTIMATE = (
 )
 BY_POLYNOMIALS = ESTIMATE.format("cubic polynomials that ship, while the tip goes by rigid kinematics")
 BY_NETWORK = ESTIMATE.format("the paper's network, while the tip goes by its commands")
-COMMAND = "With the hybrid inverse model the tip errs less than with rigid kinematics."
-AGAINST_RIGID = "With the hybrid inverse model the soft arm's tip errs less than that of an arm with rigid links."
-STIFFER = "By {} the soft arm's tip errs less than that of a rigid arm with joints {:g} times as stiff as assumed."
+COMMAND = "With the hybrid inverse model the tip's error is less than with rigid kinematics."
+AGAINST_RIGID = "With the hybrid inverse model the soft arm's tip has less error than that of an arm with rigid links."
+STIFFER = "By {} the soft arm's tip has less error than that of a rigid arm with joints {:g} times as stiff as assumed."
 
 
 def test_each_run_is_of_one_way_on_one_arm():
@@ -93,7 +93,7 @@ def test_claims_are_judged_both_ways():
 def test_the_claim_against_the_rigid_arm_gets_no_verdict_and_is_told_where_it_falls():
     claims = claims_of(table_of())
     assert claims[AGAINST_RIGID].verdict is Verdict.NOT_COMPARABLE
-    assert "hangs on that" in claims[AGAINST_RIGID].reason
+    assert "depends on that" in claims[AGAINST_RIGID].reason
     verdicts = [claims[STIFFER.format(PUBLISHED.label, factor)].verdict_text for factor in JOINT_FACTORS[1:]]
     assert verdicts == ["holds", "does not hold", "does not hold"]
     hangs = next(t for t in Vsl2().tables(table_of()) if t.title.startswith("What the claim"))
@@ -124,7 +124,7 @@ def test_errors_on_other_arms_stand_apart():
         return 0.05 if given.get("arm_seed") == "3" and given.get("learned") == "small" else usual(given)
 
     broken = claims_of(table_of(fails_on_one))
-    on = f"On each of the {len(OTHERS)} arms tried from which nothing was learned the tip errs less by "
+    on = f"On each of the {len(OTHERS)} arms tried from which nothing was learned the tip's error is less by "
     on += "{} than by rigid kinematics."
     assert broken[on.format("small network")].verdict is Verdict.NOT_REPRODUCED
     assert "arm 3 of its kind" in broken[on.format("small network")].reason
