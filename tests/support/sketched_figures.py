@@ -1,5 +1,6 @@
 """Figures drawn once and at a low resolution, instead of saved as PNG and SVG, and kept for what they show."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -23,7 +24,7 @@ def sketches(monkeypatch: pytest.MonkeyPatch) -> Sketches:
     """Return the figures that the test draws."""
     kept = Sketches()
 
-    def sketch(canvas: Figure, path: Path) -> None:
+    def sketch(canvas: Figure, path: Path, _formats: Sequence[str]) -> None:
         canvas.savefig(path.with_suffix(".png"), dpi=30)
         kept[path.name] = canvas
 
