@@ -5,8 +5,9 @@ suggest the nearest valid name and find in a unit's log the line that gives the 
 """
 
 import difflib
+import heapq
 import re
-from collections.abc import Generator, Iterable, Sequence
+from collections.abc import Collection, Generator, Iterable, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, ClassVar
@@ -23,6 +24,9 @@ _OWN_NAME = re.compile(r"^handover(?:\.\w+)+: ")
 _LIKE, _AS_LIKELY = 0.5, 0.3
 """How like a name, of 1, one that is suggested is at least, and how much less than the one most like it."""
 
+_COMPARED, _MANY = 199, 100
+"""Letters of names that are compared, and names that are compared letter by letter."""
+
 _RAISED = re.compile(r'\A[\s\S]*^  File "[^\n]*\n(?:[ \t][^\n]*\n)*(\S[\s\S]*)', re.MULTILINE)
 """A traceback, as far as to what was raised, whose message may have several lines."""
 
@@ -33,20 +37,32 @@ def did_you_mean(names: Sequence[str]) -> str:
 
 
 def suggestion(name: object, valid: Iterable[str]) -> str:
-    """Return "did you mean ...?" with the valid names that are nearest, "" where none is near."""
-    likeness = {n: difflib.SequenceMatcher(None, n, str(name)).ratio() for n in sorted(set(valid))}
+    """Return "did you mean ...?" with the valid names that are nearest, "" where none is near.
+
+    Of many names those are compared that have most pairs of letters in common with it.
+    """
+    text = str(name)[:_COMPARED]
+    names: Collection[str] = set(valid)
+    if len(names) > _MANY:
+        pairs = dict.fromkeys(re.escape(text[k : k + 2]) for k in range(len(text) - 1))
+        common = re.compile("|".join(pairs)).findall
+        names = heapq.nlargest(_MANY, names, lambda n: len(common(n[:_COMPARED])) - 0.01 * abs(len(n) - len(text)))
+    matcher, likeness = difflib.SequenceMatcher(None, "", text), dict[str, float]()
+    for n in names:
+        matcher.set_seq1(n[:_COMPARED])
+        likeness[n] = matcher.ratio()
     least = max(_LIKE, max(likeness.values(), default=0.0) - _AS_LIKELY)
     return did_you_mean(sorted((n for n, x in likeness.items() if x >= least), key=lambda n: (-likeness[n], n)))
 
 
 def nearest(name: object, valid: Iterable[str]) -> str:
     """Return the suggestion of valid names; where none is near, all of them."""
-    names = sorted(set(valid))
+    names = set(valid)
     if near := suggestion(name, names):
         return near
     if not names:
         return "there are none"
-    return f"valid: {', '.join(names[:20])}{', ...' if len(names) > 20 else ''}"
+    return f"valid: {', '.join(heapq.nsmallest(20, names))}{', ...' if len(names) > 20 else ''}"
 
 
 def log_lines(log: Iterable[str]) -> list[str]:

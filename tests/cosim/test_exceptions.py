@@ -26,6 +26,12 @@ def test_a_suggestion_is_empty_where_no_name_is_near():
     assert suggestion("x", ["alpha", "beta"]) == suggestion("x", []) == ""
 
 
+def test_among_very_many_names_the_nearest_is_found_and_of_long_ones_their_beginning_is_compared():
+    names = [f"model.body_{k}.frame[{j}].force" for k in range(200) for j in range(50)]
+    assert suggestion("model.body_77.frame[5].forse", names).startswith("did you mean model.body_77.frame[5].force")
+    assert suggestion("x" * 10**6, names) == ""
+
+
 def test_of_a_traceback_all_that_was_raised_is_the_last_line():
     try:
         raise ValueError("the arm is lost\n  (see the manual)\n")
