@@ -2,6 +2,7 @@
 
 import contextlib
 from collections.abc import Mapping
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from handover.scenarios.execution.ssp_run import open_experiment
 from handover.scenarios.execution.unit_values import built_system
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.live_inputs import inputs_of_pushes
+from handover.scenarios.experiment.parameters import parameters_of
 from handover.scenarios.results.run_folder import (
     InvalidRunFolder,
     RunFolder,
@@ -120,6 +122,8 @@ class InterruptedRun:
                 inputs=resumed_inputs(self.folder, description.get("inputs"), pushes, hand),
                 pushed=not inputs_of_pushes(pushes).keys().isdisjoint(recorded_input_names(self.folder)),
             )
+            given = parameters_of(type(experiment), description["parameters"])
+            self.resumption.check_run(replace(task, parameters=given))
         except InvalidRunFolder:
             raise
         except (KeyError, TypeError, ValueError) as e:

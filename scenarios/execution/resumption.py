@@ -1,5 +1,7 @@
 """What a run keeps in its checkpoints besides the units' states, so that another process can resume it: plain data."""
 
+import hashlib
+import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,6 +16,7 @@ from handover.cosim.stepping.options import OPTION_RECORDS, MasterOptions
 from handover.scenarios.experiment.experiment import Evaluator, Experiment
 from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters, text_of
 from handover.scenarios.results.summary import ElapsedTime
+from handover.scenarios.results.task import Task
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,12 +25,14 @@ class _Kept:
 
     Attributes:
         evaluator: the evaluator's state.
+        run: the digest of the run, see `run_digest`.
         parameters: the text of each of the scenario's parameters.
         options: of the master.
         spent: seconds so far.
     """
 
     evaluator: bytes
+    run: str
     parameters: Mapping[str, str]
     options: MasterOptions
     spent: ElapsedTime
@@ -68,6 +73,16 @@ class Resumption:
         self._kept = kept
         self.options, self.spent = kept.options, kept.spent
 
+    def check_run(self, task: Task) -> None:
+        """Check that the checkpoint is of a task's run.
+
+        Raises:
+            InvalidCheckpoint: it is of a run with another seed, other parameters, or from another file.
+        """
+        if run_digest(task) != self._kept.run:
+            fault = "it is of another run: its parameters, its seed or its file are not those of the run.json beside it"
+            raise InvalidCheckpoint(self._path, fault)
+
     def parameters(self, experiment: type[Experiment[Any]]) -> Any:
         """Return the parameters of the run's scenario.
 
@@ -99,10 +114,19 @@ class Resumption:
         return InvalidCheckpoint(self._path, f"what it keeps of the scenario cannot be read: {one_line(error)}")
 
 
-def pack(
-    experiment: Experiment[Any], evaluator: bytes, parameters: Any, options: MasterOptions, spent: ElapsedTime
-) -> bytes:
+def pack(task: Task, evaluator: bytes, spent: ElapsedTime) -> bytes:
     """Return what a checkpoint keeps besides the units' states; of the evaluator, its state."""
-    texts = {v.name: text_of(v, getattr(parameters, v.name)) for v in experiment.parameters()}
-    kept = _Kept(evaluator=evaluator, parameters=texts, options=options, spent=spent)
+    run, texts = run_digest(task), _texts(task)
+    kept = _Kept(evaluator=evaluator, run=run, parameters=texts, options=task.options, spent=spent)
     return pack_state(kept, RECORDS)
+
+
+def run_digest(task: Task) -> str:
+    """Return the SHA-256 of what tells runs apart that have the same units: parameters, seed and source."""
+    seed = task.seed if task.experiment.is_seeded else None
+    content = json.dumps([_texts(task), seed, {**task.unit_values}, {**task.source}], sort_keys=True)
+    return hashlib.sha256(content.encode()).hexdigest()
+
+
+def _texts(task: Task) -> dict[str, str]:
+    return {v.name: text_of(v, getattr(task.parameters, v.name)) for v in task.experiment.parameters()}

@@ -219,7 +219,7 @@ def _checkpoints(
         return []
 
     def packed() -> bytes:
-        return pack(task.experiment, evaluator.packed(), task.parameters, task.options, clock())
+        return pack(task, evaluator.packed(), clock())
 
     return [Checkpointer(task.folder.checkpoint, task.every, master, recorder, packed)]
 

@@ -159,6 +159,12 @@ def refusal_of(folder: Path) -> str:
     return re.sub(r"\(here [^)]*\)", "(here ...)", line.replace(f"(process {os.getpid()})", "(process PID)"))
 
 
+@pytest.mark.parametrize("other", [{"seed": 9}, {"parameters": {"strategy": "blind"}}])
+def test_a_checkpoint_of_another_run_is_refused(copy: Path, other: dict[str, Any]):
+    (copy / "run.json").write_text(json.dumps({**data_in(copy, "run"), **other}))
+    assert "it is of another run" in refusal_of(copy)
+
+
 def with_part(
     copy: Path, part: str, content: bytes, kind: int = zipfile.ZIP_STORED, *, keep_digest: bool = False
 ) -> None:
