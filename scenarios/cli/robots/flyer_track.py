@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from handover.scenarios.execution.errors import UsageError, one_line_errors
-from handover.scenarios.results.run_folder import RunFolder, check_place, make_folder_of
+from handover.scenarios.results.run_folder import RunFolder, check_place, make_folder_of, replacing
 
 _PATH = click.Path(path_type=Path)
 _SIGNALS = ("person.p_WH_goal", "person.q_WH_goal", "person.finger_goal", "person.closed_goal")
@@ -53,7 +53,8 @@ def _write(run: RunFolder, out: Path) -> int:
     poses = (HandPose(tuple(a), tuple(b), tuple(c), bool(d)) for a, b, c, d in zip(p, q, angles, closed, strict=True))
     make_folder_of(out)
     try:
-        write_track(out, zip(record.time.tolist(), poses, strict=True))
+        with replacing(out) as unfinished:
+            write_track(unfinished, zip(record.time.tolist(), poses, strict=True))
     except OSError as e:
         raise UsageError(f"{out} cannot be written: {e.strerror}") from e
     return len(record.time)
