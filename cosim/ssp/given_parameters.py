@@ -110,6 +110,8 @@ def named_parameters(
         parameter = named_parameter(known, descriptions, name)
         if parameter is None:
             faults.append(f"no parameter {name!r}; {nearest(name, known)}")
+        elif (array := f"{parameter.path}.{parameter.declared.name}") in texts and array != name:
+            faults.append(f"{array} and {name} are both given; give the array, or entries of it")
         else:
             values[parameter.path, parameter.name] = parameter.value(text)
     return values, faults

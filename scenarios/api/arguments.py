@@ -15,7 +15,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from handover.cosim.exceptions import CosimError, UnitFailure, nearest
+from handover.cosim.exceptions import CosimError, UnitFailure, nearest, visible
 from handover.cosim.fmu.file.default_experiment import exact_seconds
 from handover.cosim.record.formats import RECORD_FORMATS
 from handover.cosim.stepping.options import CALL_LIMIT, Algorithm, MasterOptions
@@ -32,6 +32,7 @@ from handover.scenarios.execution.fmu_run import is_fmu
 from handover.scenarios.execution.selection import find_scenario
 from handover.scenarios.execution.ssp_run import is_ssp
 from handover.scenarios.experiment.experiment import Experiment
+from handover.scenarios.experiment.parameters import InvalidParameter
 
 Seconds = float | Fraction
 """A time in seconds; a number with a point is taken as it is written, 0.1 as one tenth."""
@@ -62,8 +63,9 @@ def errors_for_python(
         with one_line_errors():
             yield
     except UsageError as e:
-        meant = [] if function is None else _meant_arguments(e.message, named or {}, function)
-        raise InvalidInput("; ".join([_with_arguments(e.message), *meant])) from e.__cause__
+        unknown: Sequence[str] = e.__cause__.unknown if isinstance(e.__cause__, InvalidParameter) else ()
+        meant = [] if function is None else _meant_arguments([n for n in unknown if n in (named or ())], function)
+        raise InvalidInput(visible("; ".join([_with_arguments(e.message), *meant]))) from e.__cause__
     except (UnitLost, RunNotWritten, WorkersLost) as e:
         cause = e.__cause__
         raise cause if isinstance(cause, (CosimError, UnitFailure, ClusterLost)) else e from None
@@ -73,12 +75,11 @@ _LIKE_AN_ARGUMENT = 0.7
 """How like an argument's name, of 1, an unknown keyword is that is taken for a misspelled one."""
 
 
-def _meant_arguments(message: str, named: Mapping[str, Any], function: Callable[..., Any]) -> list[str]:
-    """Return a hint for each keyword that a message calls no parameter and that is like an argument's name."""
+def _meant_arguments(unknown: Sequence[str], function: Callable[..., Any]) -> list[str]:
+    """Return a hint for each keyword that is no parameter and is like an argument's name."""
     own = {p.name: p.name for p in signature(function).parameters.values() if p.kind is Parameter.KEYWORD_ONLY}
     of_master = {f.name: f"options=handover.MasterOptions({f.name}=...)" for f in fields(MasterOptions)}
     arguments = {**(of_master if "options" in own else {}), **own}
-    unknown = [n for n in named if re.search(f"no parameter(?: or input)? '{re.escape(n)}'", message)]
     near = {n: get_close_matches(n, arguments, 1, _LIKE_AN_ARGUMENT) for n in unknown}
     return [f"if {n!r} is meant as an argument, {arguments[names[0]]} is right" for n, names in near.items() if names]
 

@@ -99,6 +99,10 @@ def load(folder: Path | str) -> Run | Campaign:
     path = path_of("folder", folder)
     if CampaignFolder(path).is_there:
         return Campaign(path)
-    if not RunFolder.of_run(path).is_there:
-        raise InvalidInput(f"{path} {OF_NEITHER}" if path.is_dir() else f"{path}: {nothing_at(path)}")
+    if not _has_results(path):
+        raise InvalidInput(f"{path} {OF_NEITHER}" if path.is_dir() else f"{path}: {nothing_at(path, _has_results)}")
     return Run(path)
+
+
+def _has_results(path: Path) -> bool:
+    return CampaignFolder(path).is_there or RunFolder.of_run(path).is_there

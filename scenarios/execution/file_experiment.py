@@ -21,6 +21,9 @@ from handover.cosim.system.system import System
 from handover.scenarios.experiment.experiment import Evaluator, Experiment, FmuOf, Metric, Outcome
 from handover.scenarios.experiment.time_plot import TimeFigure
 
+ENDLESS = Fraction(10**6)
+"""The duration of what a program steps as far as it likes, s: its end is never reached."""
+
 MAX_ENTRIES = 9
 """Entries of an array up to which each of them has metrics."""
 
@@ -31,8 +34,9 @@ _MAX_HEADLINE = 12
 class UntilStop(Evaluator):
     """Lets a run continue to its stop time; it succeeds if it reaches that, or a unit ends the simulation before."""
 
-    def __init__(self, stop: Fraction) -> None:
-        self._stop, self._t, self._ended = float(stop), 0.0, False
+    def __init__(self, start: Fraction, stop: Fraction) -> None:
+        self._stop, self._is_bounded = float(stop), stop - start < ENDLESS
+        self._t, self._ended = 0.0, False
 
     def __call__(self, t: float, signals: Signals) -> None:  # noqa: ARG002
         """Note the time."""
@@ -52,7 +56,7 @@ class UntilStop(Evaluator):
         reached = self._t >= self._stop
         return Outcome(
             success=reached or self._ended,
-            reason=f"ran to {self._t:g} s" + ("" if reached else f" of {self._stop:g} s"),
+            reason=f"ran to {self._t:g} s" + (f" of {self._stop:g} s" if not reached and self._is_bounded else ""),
         )
 
 
@@ -128,7 +132,7 @@ def system_experiment(
             return stop
 
         def evaluator(self, parameters: Any) -> UntilStop:  # noqa: ARG002
-            return UntilStop(stop)
+            return UntilStop(begin, stop)
 
         def recorded_metrics(self, signals: Path) -> Mapping[str, Metric]:
             return _metrics(signals, prefix)

@@ -15,10 +15,11 @@ from handover.cosim.fmu.file.description import FmuDescription, FmuPort, describ
 from handover.cosim.system.system import PortName, System
 from handover.cosim.system.wiring_faults import value_faults
 from handover.scenarios.execution.errors import UsageError
-from handover.scenarios.execution.file_experiment import FileExperiment, SettableParameters, system_experiment
+from handover.scenarios.execution.file_experiment import ENDLESS, FileExperiment, SettableParameters, system_experiment
 from handover.scenarios.execution.input_file import columns_of, read_inputs
-from handover.scenarios.execution.ssp_run import ENDLESS, checked_stop, naming_step
+from handover.scenarios.execution.ssp_run import checked_stop, naming_step
 from handover.scenarios.execution.unit_values import start_values
+from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.results.run_folder import sha256_of
 
 
@@ -83,7 +84,7 @@ class FmuRun:
         d = describe_fmu(self.path)
         start, faults = start_values(d.settable, self.parameters)
         if faults:
-            raise UsageError(f"{self.path}: {'; '.join(faults)}")
+            raise UsageError(f"{self.path}: {'; '.join(faults)}") from InvalidParameter(faults)
         until, system = self._until(d.experiment), System()
         system.start = self._from(d.experiment)
         unit = system.add(d.identifier, d, period=self.step)

@@ -18,11 +18,11 @@ from handover.cosim.system.system import System
 from handover.fmus.build import cached
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.execution.errors import UsageError
-from handover.scenarios.execution.file_experiment import system_experiment
+from handover.scenarios.execution.file_experiment import ENDLESS, system_experiment
 from handover.scenarios.execution.fmu_run import FmuRun, is_fmu
 from handover.scenarios.execution.runner import experiment_system
 from handover.scenarios.execution.selection import find_scenario, own_source, path_of_class, replacements, select_fmus
-from handover.scenarios.execution.ssp_run import ENDLESS, checked_stop, is_ssp, open_experiment, source_of
+from handover.scenarios.execution.ssp_run import checked_stop, is_ssp, open_experiment, source_of
 from handover.scenarios.execution.unit_values import split_parameters
 from handover.scenarios.experiment.experiment import Experiment, NoParameters
 from handover.scenarios.results.run_folder import RunFolder, dated_folder

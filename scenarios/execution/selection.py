@@ -46,11 +46,11 @@ def folder_fault(path: Path) -> str:
     )
 
 
-def nothing_at(path: Path) -> str:
-    """Return that there is nothing at a path, with the names of what is there that are most like its."""
+def nothing_at(path: Path, is_meant: Callable[[Path], bool] = Path.exists) -> str:
+    """Return that there is nothing at a path, with the names of what is there, and meant, that are most like its."""
     if not path.parent.is_dir():
         return f"there is no such file or folder, nor a folder {path.parent}"
-    near = suggestion(path.name, [p.name for p in path.parent.iterdir()])
+    near = suggestion(path.name, [p.name for p in path.parent.iterdir() if is_meant(p)])
     return "there is no such file or folder" + (f"; {near}" if near else "")
 
 

@@ -16,11 +16,8 @@ from handover.cosim.ssp.xml import STRUCTURE
 from handover.cosim.typed_data import is_exact_time
 from handover.scenarios.execution import supervisor
 from handover.scenarios.execution.errors import UsageError
-from handover.scenarios.execution.file_experiment import FileExperiment, SettableParameters, system_experiment
+from handover.scenarios.execution.file_experiment import ENDLESS, FileExperiment, SettableParameters, system_experiment
 from handover.scenarios.results.run_folder import sha256_of
-
-ENDLESS = Fraction(10**6)
-"""The duration of what a program steps as far as it likes, s: its end is never reached."""
 
 
 def is_ssp(name: str) -> bool:

@@ -19,7 +19,13 @@ from handover.cosim.system.system import PlacedUnit, System
 from handover.scenarios.execution.file_experiment import SettableParameters, settable_of
 from handover.scenarios.execution.input_file import columns_of, value_of
 from handover.scenarios.experiment.experiment import Experiment
-from handover.scenarios.experiment.parameters import InvalidParameter, number_text, parse_parameters, text_of
+from handover.scenarios.experiment.parameters import (
+    InvalidParameter,
+    UnknownParameter,
+    number_text,
+    parse_parameters,
+    text_of,
+)
 from handover.scenarios.results.tolerated_faults import scenario_code
 
 
@@ -33,10 +39,14 @@ def start_values(ports: Mapping[str, FmuPort], given: Sequence[str]) -> tuple[di
     entries, faults = columns_of(ports), list[str]()
     start: dict[str, Any] = {}
     seen: set[str] = set()
+    names = {text.partition("=")[0].strip() for text in given}
     for text in given:
         name, equals, value = (part.strip() for part in text.partition("="))
+        array = entries[name][0].name if name in entries else name
         if not equals:
             faults.append(f"{text!r} is not of the form NAME=VALUE")
+        elif array != name and array in names:
+            faults.append(f"{array} and {name} are both given; give the array, or entries of it")
         elif name in seen:
             faults.append(f"{name} is given twice")
         elif name not in ports and name not in entries:
@@ -55,7 +65,7 @@ def unknown_name(ports: Mapping[str, FmuPort], name: str) -> str:
     """Return the fault of a name that is none of some ports, with the nearest of theirs."""
     causalities = dict.fromkeys(p.causality for p in ports.values())
     kinds = [c.value for c in causalities if c in (Causality.PARAMETER, Causality.INPUT)] or ["parameter"]
-    return f"no {' or '.join(kinds)} {name!r}; {nearest(name, ports)}"
+    return UnknownParameter(f"no {' or '.join(kinds)}", name, ports)
 
 
 def _set(start: dict[str, Any], port: FmuPort, k: int | None, text: str) -> None:

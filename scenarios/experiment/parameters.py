@@ -1,22 +1,36 @@
 """Turns `name=value` texts into a scenario's parameters, and back; all faults are reported, with valid values."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, cast
 
 import numpy as np
 
+from handover.cosim.blocks.declarations import short_repr
 from handover.cosim.blocks.start_values import fault_of, range_of
 from handover.cosim.blocks.variable import Kind, Variable
 from handover.cosim.exceptions import nearest, suggestion
 from handover.scenarios.experiment.experiment import Experiment
 
 
+class UnknownParameter(str):
+    """The fault of a name that is no parameter's, with the nearest of theirs; `name` is the name."""
+
+    name: str
+
+    def __new__(cls, what: str, name: str, known: Iterable[str]) -> "UnknownParameter":
+        """Return it: what has no parameter, up to the name."""
+        fault = super().__new__(cls, f"{what} {short_repr(name)}; {nearest(name, known)}")
+        fault.name = name
+        return fault
+
+
 class InvalidParameter(ValueError):
-    """Unknown parameters, or values out of their range; `faults` lists them all."""
+    """Unknown parameters, or values out of their range; `faults` lists them all, `unknown` the names of the former."""
 
     def __init__(self, faults: Sequence[str]) -> None:
         super().__init__("; ".join(faults))
         self.faults = tuple(faults)
+        self.unknown = tuple(fault.name for fault in faults if isinstance(fault, UnknownParameter))
 
 
 def parse_parameters(experiment: type[Experiment[Any]], given: Sequence[str]) -> Any:
@@ -57,7 +71,7 @@ def texts_by_name(
         if not equals:
             faults.append(f"{text!r} is not of the form {form}")
         elif name not in known:
-            faults.append(f"{experiment.name} has no parameter {name!r}; {nearest(name, known)}")
+            faults.append(UnknownParameter(f"{experiment.name} has no parameter", name, known))
         elif name in texts:
             faults.append(f"{name} is given twice")
         else:

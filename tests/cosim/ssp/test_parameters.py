@@ -239,6 +239,8 @@ def test_an_entry_of_an_array_leaves_the_others_as_the_file_has_them(fmu: Path):
     whole = packed(fmu, system(component("a", bindings(parameters("p[1]|Real|10", "p[2]|Real|20")))))
     np.testing.assert_array_equal(starts(whole, {"a.p[2]": "7"})["a"]["p"], [10.0, 7.0])
     np.testing.assert_array_equal(starts(whole, {"a.p": "8,9"})["a"]["p"], [8.0, 9.0])
+    with pytest.raises(InvalidSsp, match=r"a\.p and a\.p\[2\] are both given"):
+        starts(whole, {"a.p[2]": "7", "a.p": "8,9"})
     partly = packed(fmu, system(component("a")))
     assert starts(partly, {"a.p[2]": "7"}) == {"a": {"p[2]": 7.0}}
 

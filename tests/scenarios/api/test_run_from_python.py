@@ -18,6 +18,7 @@ from handover.controllers.ir_grasp.parameters import Strategy
 from handover.cosim.exceptions import InvalidOptions
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.experiment.experiment import Experiment
+from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
 
 OPTIONS = set(handover.run.__kwdefaults__ or {}) | set(handover.sweep.__kwdefaults__ or {})
@@ -92,6 +93,25 @@ def test_an_fmu_is_run_by_itself(tmp_path: Path):
     force = run.signals["Push.f_G"][:, 0]
     assert (force[run.signals.time < 0.24] == 0.0).all()
     assert force.max() == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize("subject", ["ir_grasp", native_fmu("gain")])
+def test_a_keyword_that_is_like_an_argument_is_taken_for_one(subject: str | Path):
+    with pytest.raises(handover.InvalidInput, match="if 'sead' is meant as an argument, seed is right") as raised:
+        handover.run(subject, sead=1)
+    assert isinstance(raised.value.__cause__, InvalidParameter)
+    assert raised.value.__cause__.unknown == ("sead",)
+
+
+def test_a_name_of_a_megabyte_is_cut(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    with pytest.raises(handover.InvalidInput, match="has no parameter") as raised:
+        handover.run("ir_grasp", parameters={"a" * 10**6: 1})
+    assert len(str(raised.value)) < 1000
+    monkeypatch.chdir(tmp_path)
+    Path("nop").mkdir()
+    Path("notes").touch()
+    with pytest.raises(handover.InvalidInput, match=r"^nope: there is no such file or folder$"):  # neither has results
+        handover.load("nope")
 
 
 def test_units_are_isolated(tmp_path: Path):

@@ -74,6 +74,7 @@ def test_what_cannot_be_set_or_read_is_refused(wording: Wording):
 def test_durations_add_up_exactly():
     with handover.open(gain(native_fmu("gain"))) as s:
         assert [s.step(0.1) for _ in range(10)][-1] == 1.0
+        assert s.outcome.reason == "ran to 1 s"  # without a stop time
         assert s.step(0.05) == 1.1  # the first communication point at or after it
         assert s.step(0.05) == 1.1
 

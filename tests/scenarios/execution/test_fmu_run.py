@@ -139,6 +139,12 @@ def test_entries_of_an_array_are_columns(tmp_path: Path):
     assert last.tolist() == pytest.approx([1.0, 8.0, 9.0])
 
 
+@pytest.mark.parametrize("order", [1, -1])
+def test_an_array_and_an_entry_of_it_are_not_given_both(order: int):
+    given = ["-pu=7,8,9", "-pu[2]=1"][::order]
+    assert "u and u[2] are both given" in refusal("run", native_fmu("array_passer"), "--stop", "1", *given)
+
+
 def test_a_start_value_that_is_nan_is_warned_of_unless_another_is_given(
     decay_library: bytes, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ):
