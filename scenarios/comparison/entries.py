@@ -153,7 +153,8 @@ def _faults_of_folders(folders: Sequence[Path]) -> list[str]:
 def _faults_of_names(folders: Sequence[Path], names: Sequence[str]) -> list[str]:
     faults: list[str] = []
     if names and len(names) != len(folders):
-        faults.append(f"{len(names)} names for {len(folders)} folders; give --name once for each, in their order")
+        given = "--name is given once" if len(names) == 1 else f"--name is given {len(names)} times"
+        faults.append(f"{given}, for {len(folders)} folders; each takes one, in their order")
     faults += [f"name {name!r} is given twice" for name in dict.fromkeys(n for n in names if names.count(n) > 1)]
     return faults + ["a name is empty" for name in names if not name.strip()]
 

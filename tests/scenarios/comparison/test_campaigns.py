@@ -221,7 +221,7 @@ def test_all_faults_of_folders_and_names_are_told_at_once(tmp_path: Path):
     faults = faults_of(first, other, broken, empty, first, names=["x", "x", "y"])
     assert [fault.partition(";")[0] for fault in faults[:3]] == [
         f"{first} is named twice",
-        "3 names for 5 folders",
+        "--name is given 3 times, for 5 folders",
         "name 'x' is given twice",
     ]
     assert any(f.startswith(f"{broken}: its campaign.json is damaged") for f in faults)
