@@ -23,9 +23,7 @@ IN_NEITHER = {
     "Navigation": "seed",
     "HandAndObject": "seed",
     "LargeObjectAndHands": "seed",
-    "AdmittanceController": "f_max inertia_ratio k_R k_v k_w k_x observer_rate tau_max",
-    "ArmImpedanceController": "I_L axis_J centre_L joints link mass_L null_damping null_frequency q_J_goal "
-    "rotational_damping rotor_J damping_rotation",
+    "ArmImpedanceController": "joints",
     "GraspScene": "seed",
 }
 """Parameters of units that are neither published nor assumed: `paper.toml` lacks them or gives another value."""

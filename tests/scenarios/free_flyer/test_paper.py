@@ -10,6 +10,7 @@ import tomli
 from support.scenarios.parameter_origins import assert_every_default_has_its_origin
 
 import handover.scenarios.free_flyer
+from handover.controllers.free_flyer.admittance_controller import Params as AdmittanceParams
 from handover.controllers.free_flyer.arm_impedance_controller import Params as ArmControllerParams
 from handover.controllers.free_flyer.handover_parameters import Params as DecisionParams
 from handover.controllers.free_flyer.handover_team import Params as TeamDecisionParams
@@ -37,6 +38,7 @@ CODE = {
     "push": PushParams,
     "person": PersonParams,
     "impedance": ImpedanceParams,
+    "impedance + admittance": AdmittanceParams,
     "pose": PoseParams,
     "decision": DecisionParams,
     "decision + team_decision": TeamDecisionParams,

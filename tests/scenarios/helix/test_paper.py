@@ -55,14 +55,13 @@ _OPTICS: dict[str, tuple[Any, ...]] = {
     **{name: ("camera", name) for name in ("apothem", "marker", "rings", "ball_radius")},
 }
 _PLACE: dict[str, tuple[Any, ...]] = {
-    "alpha": ("experiment", "default_alpha"),
     "radius": ("experiment", "radius"),
     "height": ("experiment", "height"),
 }
 
 SHARED: dict[str, dict[str, tuple[Any, ...]]] = {
     "servo": {
-        "alpha": ("experiment", "default_alpha"),
+        "alpha": ("task", "alpha"),
         "control_period": ("experiment", "control_period"),
         "carry_after": ("delivery", "carry_after"),
         "threshold_drop": ("delivery", "threshold_drop", Tuning.OWN),
@@ -74,14 +73,13 @@ SHARED: dict[str, dict[str, tuple[Any, ...]]] = {
     | {
         "has_third": ("pictures", "has_third"),
         "decimation": ("pictures", "decimation"),
-        "detector": ("experiment", "default_detector"),
+        "detector": ("task", "detector"),
         "d_gripper": ("servo", "d_gripper"),
     },
     "task": _PLACE
     | {
         "control_period": ("experiment", "control_period"),
         "threshold": ("servo", "threshold"),
-        "detector": ("experiment", "default_detector"),
         "marker": ("camera", "marker"),
         "rings": ("camera", "rings"),
     },
@@ -100,7 +98,7 @@ SHARED: dict[str, dict[str, tuple[Any, ...]]] = {
         "covered_markers": ("pictures", "covered_markers"),
         "jitter": ("servo", "jitter"),
     },
-    "reach": _PLACE | {"azimuth": ("task", "azimuth"), "patience": ("task", "patience")},
+    "reach": _PLACE | {name: ("task", name) for name in ("alpha", "azimuth", "patience")},
 }
 """Parameters whose origin is that of another one: its group, its name there, and where it is a list, which element."""
 
