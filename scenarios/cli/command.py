@@ -60,7 +60,8 @@ Exit status
 
 \b
 Environment
-  HANDOVER_CACHE  folder of built units [default: the user's cache folder]
+  HANDOVER_CACHE    folder of built units [default: the user's cache folder]
+  HANDOVER_COMPILE  0: the Helix's units as plain Python, though Numba is there
   For variables that units read, here as in other tools, see `handover build --help`
 """
 
