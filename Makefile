@@ -66,11 +66,12 @@ wording: $(VENV)/.installed-test
 
 # The site, which opens offline: docs/build/html/index.html.
 docs: $(VENV)/.installed-docs
+	PYTHONPATH=tests $(BIN)/python docs/sources.py
 	$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going --builder html docs docs/build/html
 
 # The README's pictures; needs chromium, too.
 pictures: $(VENV)/.installed-test
-	$(BIN)/python docs/pictures.py
+	PYTHONPATH=tests $(BIN)/python docs/pictures.py
 
 # The units' icons as PNG, of their drawings in fmus/icons/.
 icons: $(VENV)/.installed-test

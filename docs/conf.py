@@ -1,19 +1,20 @@
-"""The site, built by Sphinx: `make docs`. Pages of units, scenarios and commands are made from their declarations."""
+"""The site, built by Sphinx: `make docs`. `sources.py` makes pages from declarations, and what tutorials run in."""
 
+import os
+import re
 import shutil
 import sys
 from functools import partialmethod
 from importlib.metadata import version as version_of
 from pathlib import Path
+from urllib.parse import unquote
 
 from nbclient import NotebookClient
 from sphinx.application import Sphinx
+from sphinx.errors import ExtensionError
 
-DOCS = Path(__file__).parent
-sys.path[:0] = [str(DOCS), str(DOCS.parent / "tests")]
-
-import declared_pages  # noqa: E402
-import tutorial_kernel  # noqa: E402
+sys.path.insert(0, str(Path(__file__).parent))
+from equations import show_block, show_inline
 
 project = "handover-cosim"
 author = "The handover-cosim authors"
@@ -33,9 +34,10 @@ default_role = "literal"
 smartquotes = False
 
 # Tutorials: executed in an empty folder each, again where the product has changed.
-_TUTORIALS = DOCS / "build" / "tutorials"
+_TUTORIALS = Path(__file__).parent / "build" / "tutorials"
+os.environ["JUPYTER_PATH"] = str(_TUTORIALS / "jupyter")
 nb_execution_mode = "cache"
-nb_execution_cache_path = str(_TUTORIALS / tutorial_kernel.kernel(_TUTORIALS) / "outputs")
+nb_execution_cache_path = str(_TUTORIALS / "outputs")
 nb_kernel_rgx_aliases = {".*": "tutorial"}
 nb_execution_in_temp = True
 nb_execution_excludepatterns = [] if shutil.which("octave-cli") else ["tutorials/octave.md"]
@@ -45,6 +47,7 @@ nb_merge_streams = True
 # IPython sends what a command prints in pieces of 100 characters; MyST-NB alone would make lines of them.
 NotebookClient.__init__ = partialmethod(NotebookClient.__init__, coalesce_streams=True)
 
+html_math_renderer = "mathml"
 html_theme = "furo"
 html_title = f"handover-cosim {release}"
 html_static_path = ["static"]
@@ -62,7 +65,22 @@ def set_code(app: Sphinx, what: str, name: str, obj: object, options: object, li
             lines[i] = f"{line}:"
 
 
+def check_links(app: Sphinx, failure: Exception | None) -> None:
+    """Look whether each file that a built page links, loads or shows is there: Sphinx asks this of Markdown's alone.
+
+    Raises:
+        ExtensionError: some are not; all are named.
+    """
+    folder = Path(app.outdir)
+    pages = [page for page in folder.rglob("*.html") if "gallery" not in page.relative_to(folder).parts]
+    linked = [(p, link) for p in pages for link in re.findall(r'(?:href|src)="([^":#?]+)["#?]', p.read_text("utf-8"))]
+    broken = [f"{p.relative_to(folder)}: {link}" for p, link in linked if not (p.parent / unquote(link)).exists()]
+    if failure is None and broken:
+        raise ExtensionError(f"files that are linked and are not there: {'; '.join(broken)}")
+
+
 def setup(app: Sphinx) -> None:
-    """Write what is made, before Sphinx looks for sources and files."""
-    declared_pages.write(DOCS, DOCS / "build" / "files")
+    """Show examples in docstrings as code, and equations without a script from the network."""
+    app.add_html_math_renderer("mathml", (show_inline, None), (show_block, None))
+    app.connect("build-finished", check_links)
     app.connect("autodoc-process-docstring", set_code)

@@ -1,17 +1,22 @@
-"""Pages of the site that are made from declarations: every unit, every scenario, their lists, and the gallery.
+"""Pages of the site that are made from declarations: units, scenarios, experiments, a run's folder, and the gallery.
 
 `write` leaves Markdown in the site's folder. Ports, parameters, units of measurement and direct feedthrough are what
-the blocks declare, laws their docstrings, and the origins of a scenario's values those of its `paper.toml`.
+the blocks declare, laws their docstrings, the origins of values those of `paper.toml`, and metrics those of runs. What
+has no description stops it: all such names are listed at once.
 """
 
 import enum
 import inspect
-from collections.abc import Iterable, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import click
 import jinja2
-from gallery import gallery_run
+from equations import with_latex
+from gallery import GalleryExperiment, GalleryRun, metrics_of
+from undocumented import Undocumented, commands, undocumented, undocumented_metrics
 
 from handover.cosim.blocks.description import Description, describe
 from handover.cosim.blocks.variable import Variable
@@ -20,38 +25,58 @@ from handover.fmus.contents.documentation import Row, cited, items, parse, row, 
 from handover.fmus.layout import Form
 from handover.scenarios.catalog import SCENARIOS, SYSTEMS, RobotSystem
 from handover.scenarios.experiment.experiment import Experiment
-from handover.scenarios.experiment.paper import parameter_origins
+from handover.scenarios.experiment.paper import paper_entry, parameter_origins
+from handover.scenarios.experiment.places import ports_of_place
 
-TEMPLATES = Path(__file__).parent / "templates"
+DOCS = Path(__file__).parent
 
 
-def write(folder: Path, files: Path) -> None:
-    """Write the pages into a folder, and into another the files of runs; a page that is the same is left as it is."""
-    loader = jinja2.FileSystemLoader(TEMPLATES)
+def write(folder: Path, runs: Mapping[str, GalleryRun], experiments: Mapping[str, GalleryExperiment]) -> None:
+    """Write the pages into a folder; a page that is the same is left as it is.
+
+    Raises:
+        Undocumented: something has no description.
+    """
+    metrics = {
+        name: metrics_of(runs[name], (e for e in experiments.values() if e.scenario == name)) for name in SCENARIOS
+    }
+    if names := [*undocumented(), *undocumented_metrics(metrics)]:
+        raise Undocumented(names)
+    loader = jinja2.FileSystemLoader(DOCS / "templates")
     templates = jinja2.Environment(
         loader=loader, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
     )
-    templates.filters.update(cell=cell, seconds=seconds)
-    runs = {name: gallery_run(name, files) for name in SCENARIOS}
+    templates.filters.update(cell=cell, seconds=seconds, sentence=sentence)
     robots = [(system, [UNITS[unit] for unit in system.units]) for system in SYSTEMS]
-    pages = {
-        "reference/units/index.md": templates.get_template("units.md").render(robots=robots),
-        "reference/scenarios/index.md": templates.get_template("scenarios.md").render(robots=SYSTEMS),
-        "gallery.md": templates.get_template("gallery.md").render(robots=SYSTEMS, runs=runs),
+    of_system = {s.package: [n for n, e in experiments.items() if e.scenario in s.scenarios] for s in SYSTEMS}
+    shown = {"robots": SYSTEMS, "runs": runs, "experiments": experiments, "of_system": of_system}
+    pages: dict[str, tuple[str, Mapping[str, Any]]] = {
+        "gallery": ("gallery", shown),
+        "reference/units/index": ("units", {"robots": robots}),
+        "reference/scenarios/index": ("scenarios", shown),
+        "reference/experiments/index": ("experiments", shown),
+        "reference/run_folder": ("run_folder", {"statuses": statuses(), "variables": environment_variables()}),
     }
     for entry in UNITS.values():
-        pages[f"reference/units/{entry.name}.md"] = templates.get_template("unit.md").render(unit=entry, **unit(entry))
+        pages[f"reference/units/{entry.name}"] = ("unit", {"unit": entry, **unit(entry)})
     for system in SYSTEMS:
         for name in system.scenarios:
-            facts = scenario(SCENARIOS[name], system)
-            pages[f"reference/scenarios/{name}.md"] = templates.get_template("scenario.md").render(
-                name=name, run=runs[name], **facts
-            )
-    for name, text in pages.items():
-        file = folder / name
+            campaigns = {n: e for n, e in experiments.items() if e.scenario == name}
+            given = {"name": name, "run": runs[name], "experiments": campaigns, "metrics": metrics[name]}
+            pages[f"reference/scenarios/{name}"] = ("scenario", {**given, **scenario(SCENARIOS[name], system)})
+    for name, experiment in experiments.items():
+        doc = parse(inspect.cleandoc(experiment.doc))
+        pages[f"reference/experiments/{name}"] = ("experiment", {"name": name, "experiment": experiment, "doc": doc})
+    for name, (template, given) in pages.items():
+        text = templates.get_template(f"{template}.md").render(**given)
+        file = folder / f"{name}.md"
         file.parent.mkdir(parents=True, exist_ok=True)
         if not file.exists() or file.read_text(encoding="utf-8") != text:
             file.write_text(text, encoding="utf-8")
+    for kind in ("units", "scenarios", "experiments"):
+        for file in (folder / "reference" / kind).glob("*.md"):
+            if f"reference/{kind}/{file.stem}" not in pages:
+                file.unlink()
 
 
 def unit(entry: Entry) -> dict[str, Any]:
@@ -61,7 +86,7 @@ def unit(entry: Entry) -> dict[str, Any]:
     ports = (("Inputs", d.inputs), ("Outputs", d.outputs))
     return {
         "declared": d,
-        "doc": parse(d.doc),
+        "doc": parse(with_latex(entry.name, d.doc)),
         "origin": d.module_doc.partition("\n\n")[0],
         "papers": cited("\n".join((d.module_doc, d.doc, *(v.description for v in d.variables)))),
         "parameters": _rows(package, d.parameters),
@@ -69,20 +94,49 @@ def unit(entry: Entry) -> dict[str, Any]:
         "feedthrough": _feedthrough(d),
         "enumerations": [(e.__name__, items(e)) for e in _enumerations(d.variables)],
         "scenarios": [name for name, kind in SCENARIOS.items() if entry.name in kind.units.values()],
+        "hosts": hosts(entry.name),
     }
 
 
 def scenario(kind: type[Experiment[Any]], system: RobotSystem) -> dict[str, Any]:
     """Return what the page of a scenario shows."""
     parameters = kind.parameters()
+    rows = {"the scenario": _rows(system.package, parameters)}
+    for place, name in kind.units.items():
+        declared = describe(import_class(UNITS[name].block)).parameters
+        rows[f"`{place}`"] = _rows(UNITS[name].block.split(".")[2], declared)
+    assumed = {of: [r.name for r, origin in listed if origin.startswith("assumed")] for of, listed in rows.items()}
+    ports = {
+        place: [(row(p.declared, Form.FMI3), p.declared.causality.value, p.is_required, p.sentence)
+                for p in ports_of_place(needs, UNITS[kind.units[place]])]
+        for place, needs in kind.places.items()
+    }  # fmt: skip
     return {
         "title": kind.title,
         "doc": parse(inspect.cleandoc(kind.__doc__ or "")),
         "units": dict(kind.units),
-        "parameters": _rows(system.package, parameters),
+        "parameters": rows["the scenario"],
         "enumerations": [(e.__name__, items(e)) for e in _enumerations(parameters)],
         "stop": kind().stop_time(kind.parameters_type()),
+        "assumed": {of: (names, len(rows[of])) for of, names in assumed.items() if names},
+        "places": [(place, kind.places[place].remarks, ports[place]) for place in kind.places],
     }
+
+
+_STATUS = re.compile(r"^  (\d+) +(.*)$", re.MULTILINE)
+_VARIABLE = re.compile(r"^  ([A-Z_]{4,}) +(.*(?:\n    +.*)*)$", re.MULTILINE)
+
+
+def statuses() -> list[tuple[str, list[tuple[str, str]]]]:
+    """Return the exit statuses and their meaning by command, as its help has them; those of all commands first."""
+    found = [(name, _STATUS.findall(_paragraph(command, "Exit status"))) for name, command in commands()]
+    return [(name, listed) for name, listed in found if listed]
+
+
+def environment_variables() -> dict[str, str]:
+    """Return the environment variables and what they do, as the commands' help has them."""
+    paragraphs = [_paragraph(command, "Environment") for _, command in commands()]
+    return {name: " ".join(text.split()) for p in reversed(paragraphs) for name, text in _VARIABLE.findall(p)}
 
 
 def cell(text: object) -> str:
@@ -103,8 +157,60 @@ def _enumerations(variables: Iterable[Variable]) -> list[type[enum.IntEnum]]:
     return list(dict.fromkeys(v.enumeration for v in variables if v.enumeration is not None))
 
 
+_LENSES = {"p_WC": "p_WC", "q_WC": "looked_at", "intrinsics": "intrinsics", "distortion": "distortion"}
+_ENTRIES = {
+    "hand_force_max": ("hand", "force_max"),
+    "guidance": ("hand", "guide_stiffness"),
+    "sensor_noise": ("pictures", "noise"),
+    "threshold_drop": ("delivery", "threshold_drop"),
+    **{f"{n}_{side}": ("camera", entry) for n, entry in _LENSES.items() for side in ("left", "right", "third")},
+}
+"""Group and name of entries of the Helix's `paper.toml` that give parameters of other names."""
+_WITHOUT_ENTRY = {
+    "seed": "follows from the run's seed",
+    **dict.fromkeys(("hinges", "hinges_dynamic", "substep", "high_frequency_damping"), "numerical"),
+    **dict.fromkeys(("link_2", "link_3", "x_g", "pressure", "method"), "set by the scenarios"),
+}
+"""What is said of parameters that no `paper.toml` has."""
+
+
 def _rows(package: str, variables: Sequence[Variable]) -> list[tuple[Row, str]]:
-    """Return the rows of a table of variables, each with the origin of its value: status and place in the paper."""
-    origins = parameter_origins(package, (v.name for v in variables))
-    entries = ((v, origins.get(v.name)) for v in variables)
-    return [(row(v, Form.FMI3), f"{entry['status']}: {entry['where']}" if entry else "") for v, entry in entries]
+    """Return the rows of a table of variables, each with the origin of its value: status and place in the paper.
+
+    Raises:
+        Undocumented: a parameter has none.
+    """
+    entries = parameter_origins(package, variables)
+    if package == "helix":
+        entries |= {v.name: paper_entry(package, *_ENTRIES[v.name]) for v in variables if v.name in _ENTRIES}
+    while referring := {n: m for n, e in entries.items() if (m := re.fullmatch(r"\[(\w+)\] (\w+)", e["where"]))}:
+        entries |= {name: paper_entry(package, m[1], m[2]) for name, m in referring.items()}
+    origins = _WITHOUT_ENTRY | {name: f"{entry['status']}: {entry['where']}" for name, entry in entries.items()}
+    if lacking := [f"origin of {v.name} of {package}" for v in variables if v.name not in origins]:
+        raise Undocumented(lacking)
+    return [(row(v, Form.FMI3), origins[v.name]) for v in variables]
+
+
+def _paragraph(command: click.Command, heading: str) -> str:
+    """Return the lines of a command's help under headings that begin so."""
+    parts = [part.strip("\n") for part in (command.help or "").split("\b")]
+    return "\n".join(p.partition("\n\n")[0] for p in parts if p.startswith(heading))
+
+
+def hosts(unit: str) -> tuple[list[str], list[list[str]]]:
+    """Return the hosts, and by form how a unit agrees in each, as the page of all hosts has it."""
+    text = (DOCS / "hosts.md").read_text(encoding="utf-8")
+    header: list[str] = []
+    rows: list[list[str]] = []
+    for section in text.split("\n## ")[1:]:
+        found = re.search(rf"^\| (`{unit}`) \|(.*) \|$", section, re.MULTILINE)
+        if found:
+            (columns,) = re.findall(r"^\| unit \| (.*) \|$", section, re.MULTILINE)
+            header = columns.split(" | ")
+            rows.append([section.partition("\n")[0], *(c.strip() for c in found[2].split(" | "))])
+    return header, rows
+
+
+def sentence(text: str) -> str:
+    """Return a text with a capital letter at its beginning."""
+    return text[:1].upper() + text[1:]

@@ -1,18 +1,74 @@
-"""The gallery: a run of every scenario by the command, with its verdict, figures and page.
+"""The gallery: a run of every scenario, and a small campaign of every published experiment, by the commands.
 
-Runs are those that tests keep (`support.kept_runs`): made anew only when code, packages or arguments have changed.
+Both are those that tests keep (`support.kept_runs`): made again only when code, packages or arguments have changed.
 """
 
 import json
 import shutil
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+from support.commands import LOADED, forking
+from support.in_process_pool import use_in_process_pool
 from support.kept_runs import kept_run
+
+import handover
+from handover.cosim.system.graph import system_svg
+from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.experiment.display_unit import unit_symbol
+from handover.scenarios.published.catalog import EXPERIMENTS
+from handover.scenarios.published.published_experiment import (
+    Claim,
+    ComparisonTable,
+    PaperResults,
+    verdict_counts,
+)
+from handover.scenarios.results.tables import format_metric
 
 _FIRST = ("scene", "pictures", "shape", "hand", "path", "error", "motion")
 """Names of figures that show most of a scenario, best first."""
+
+_OF_CAMPAIGNS = ("cli.paper", "cli.campaign", "published.catalog", "campaign.run_job", "experiment.plotting")
+"""Modules that campaigns need besides."""
+
+_POINTS: Mapping[str, Sequence[int]] = {
+    "flyer-approaches": (0, 2),
+    "flyer-controllers": (6, 8, 10, 74),
+    "flyer-handover": (0, 3),
+    "flyer-impedance": (0, 3, 6, 9),
+    "flyer-navigation": (0, 2),
+    "flyer-stability": range(30, 45, 3),
+    "flyer-study": (20, 28),
+    "helix-1": (8,),
+    "helix-2": (9,),
+    "helix-3": (4,),
+    "helix-disturbances": (4,),
+    "helix-improvements": (208,),
+    "helix-places": (0,),
+    "helix-reflex": (0,),
+    "helix-workspace": (0,),
+    "ir-convergence": range(0, 10, 2),
+    "ir-limits": range(100, 125, 5),
+    "ir-sensor": (9, 10, 11),
+    "ir-table": (0, 1, 2, 3, 20, 21, 22, 23),
+    "vsl-1": (1, 21, 26, 46, 51, 71),
+    "vsl-2": (0, 1, 2, 3, 108, 109),
+}
+"""Points of each experiment's plan that are run, once each: so few that all of them take four minutes of CPU."""
+
+Files = Mapping[str, str]
+"""Paths of files by name, relative to the site."""
+
+
+@dataclass(frozen=True)
+class MetricRow:
+    """A metric in a table: its unit, what it is, and its value in the run of the gallery, "" where that lacks it."""
+
+    name: str
+    unit: str
+    description: str
+    value: str = ""
 
 
 @dataclass(frozen=True)
@@ -21,14 +77,18 @@ class GalleryRun:
 
     Attributes:
         success, reason: its verdict.
-        figures: paths of its figures by name, relative to the site.
-        page: the path of its report page.
+        figures: its figures.
+        page: its report page.
+        diagram: its system, as SVG.
+        metrics: its metrics.
     """
 
     success: bool
     reason: str
-    figures: Mapping[str, str]
+    figures: Files
     page: str
+    diagram: str
+    metrics: Sequence[MetricRow]
 
     @property
     def first(self) -> str:
@@ -37,17 +97,110 @@ class GalleryRun:
         return (known or list(self.figures.values()))[0]
 
 
+@dataclass(frozen=True)
+class GalleryExperiment:
+    """What the gallery shows of a published experiment.
+
+    Attributes:
+        title: what was tried.
+        doc: the experiment's docstring.
+        scenario: whose runs these are.
+        runs, quick, whole: number of its runs here, of its quick form, and of the whole experiment.
+        claims: with their verdicts.
+        tables: published values beside ours.
+        figures: by name.
+        metrics: of its runs.
+    """
+
+    title: str
+    doc: str
+    scenario: str
+    runs: int
+    quick: int
+    whole: int
+    claims: Sequence[Claim]
+    tables: Sequence[ComparisonTable]
+    figures: Files
+    metrics: Sequence[MetricRow]
+
+    @property
+    def extent(self) -> str:
+        """How many runs there are here, of how many, as a sentence."""
+        number = "one run" if self.runs == 1 else f"{self.runs} runs"
+        return f"Here are {number} of its {self.whole:,}; `--quick` makes {self.quick}."
+
+    @property
+    def verdicts(self) -> str:
+        """How many claims have each verdict."""
+        counts = [*verdict_counts(self.claims, beyond=False), *verdict_counts(self.claims, beyond=True)]
+        return ", ".join(f"{n} {words}" for n, _, words in counts) or "none"
+
+
+def warm_up() -> None:
+    """Let the process from which commands are forked have loaded what campaigns need, before the first of them."""
+    forking().set_forkserver_preload([*LOADED, *(f"handover.scenarios.{m}" for m in _OF_CAMPAIGNS)])
+
+
 def gallery_run(name: str, files: Path) -> GalleryRun:
     """Run a scenario with its defaults, unless that is kept, and copy figures and page below the site's files."""
     run = kept_run("run", name)
-    folder = files / "gallery" / name
-    folder.mkdir(parents=True, exist_ok=True)
-    made = [*sorted((run / "figures").glob("*.png")), run / "report.html"]
-    for file in made:
-        shutil.copyfile(file, folder / file.name)
-    for other in folder.iterdir():
-        if other.name not in {file.name for file in made}:
-            other.unlink()
+    figures = _copied(run / "figures", files, f"gallery/{name}")
+    page = f"gallery/{name}/report.html"
+    shutil.copyfile(run / "report.html", files / page)
     summary = json.loads((run / "summary.json").read_text(encoding="utf-8"))
-    figures = {file.stem: f"gallery/{name}/{file.name}" for file in made[:-1]}
-    return GalleryRun(bool(summary["success"]), summary["reason"], figures, f"gallery/{name}/report.html")
+    headline = json.loads((run / "run.json").read_text(encoding="utf-8"))["headline"]
+    metrics = {n: MetricRow(n, unit_symbol(m["unit"]), m["description"], format_metric(m))
+               for n, m in summary["metrics"].items()}  # fmt: skip
+    ordered = {n: metrics[n] for n in (*(n for n in headline if n in metrics), *metrics)}
+    diagram = system_svg(handover.system(name))
+    return GalleryRun(bool(summary["success"]), summary["reason"], figures, page, diagram, [*ordered.values()])
+
+
+def kept_campaign(name: str) -> Path:
+    """Return the folder of few runs of an experiment."""
+    return kept_run("paper", name, "--no-report", before=(plan_few_runs, name, tuple(_POINTS[name])))
+
+
+def gallery_experiment(name: str, files: Path) -> GalleryExperiment:
+    """Carry out an experiment with few runs, unless that is kept, and copy its figures below the site's files."""
+    experiment = EXPERIMENTS[name]()
+    campaign = kept_campaign(name)
+    table = CampaignTable.read(campaign)
+    results = PaperResults.of(experiment, table, campaign / "runs")
+    return GalleryExperiment(
+        title=experiment.title,
+        doc=experiment.__doc__ or "",
+        scenario=experiment.scenario,
+        runs=len(table),
+        quick=experiment.plan(quick=True).size,
+        whole=experiment.plan(quick=False).size,
+        claims=results.claims,
+        tables=results.tables,
+        figures=_copied(campaign / "figures", files, f"gallery/experiments/{name}"),
+        metrics=[MetricRow(n, unit_symbol(table.unit(n)), table.description(n)) for n in table.metrics],
+    )
+
+
+def plan_few_runs(name: str, points: Sequence[int]) -> None:
+    """Let this process carry out some points of an experiment's plan, once each and by itself."""
+    use_in_process_pool()
+    whole = EXPERIMENTS[name]().plan(quick=False)
+    few = replace(whole, points=[whole.points[i] for i in points], repetitions=1)
+    EXPERIMENTS[name].plan = lambda *_given, **_named: few  # type: ignore
+
+
+def metrics_of(run: GalleryRun, campaigns: Iterable[GalleryExperiment]) -> list[MetricRow]:
+    """Return the metrics of a scenario's run, and those that only some of its runs in campaigns have."""
+    rows = {row.name: row for row in run.metrics}
+    for campaign in campaigns:
+        for row in campaign.metrics:
+            rows.setdefault(row.name, row)
+    return list(rows.values())
+
+
+def _copied(figures: Path, files: Path, name: str) -> Files:
+    """Copy a folder's figures into one that is made for them."""
+    folder = files / name
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    return {f.stem: f"{name}/{shutil.copyfile(f, folder / f.name).name}" for f in sorted(figures.glob("*.png"))}

@@ -22,26 +22,24 @@ INSTALLED_BY_READERS = ("pythonfmu",)
 """Packages that tutorials say to install beside the wheel with its extra `all`."""
 
 
-def kernel(folder: Path) -> str:
-    """Make the kernel "tutorial" below a folder, let Jupyter find it, and return what identifies its environment."""
-    key = code_key()
-    environment = folder / key
-    if not (environment / "whole").exists():
-        shutil.rmtree(folder, ignore_errors=True)
-        subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(environment)], check=True)
-        (packages,) = environment.glob("lib/python*/site-packages")
-        required = distributions("handover-cosim", ["all"]) - {"handover-cosim"}
-        for name in INSTALLED_BY_READERS:
-            required |= distributions(name)
-        link_distributions(required, packages)
-        with tempfile.TemporaryDirectory(prefix="handover-") as sources:
-            wheel = build_wheel(copy_sources(Path(sources) / "handover"), host_platform())
-            pip = [sys.executable, "-m", "pip", "--python", str(environment / "bin" / "python")]
-            subprocess.run([*pip, "install", "--quiet", "--no-deps", wheel], check=True)
-        _describe(environment)
-        (environment / "whole").touch()
-    os.environ["JUPYTER_PATH"] = str(environment / "jupyter")
-    return key
+def make(environment: Path) -> None:
+    """Make the environment in a folder, with its description for Jupyter, unless it is there."""
+    whole = environment / "whole"
+    if whole.exists() and whole.read_text() == code_key():
+        return
+    shutil.rmtree(environment, ignore_errors=True)
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(environment)], check=True)
+    (packages,) = environment.glob("lib/python*/site-packages")
+    required = distributions("handover-cosim", ["all"]) - {"handover-cosim"}
+    for name in INSTALLED_BY_READERS:
+        required |= distributions(name)
+    link_distributions(required, packages)
+    with tempfile.TemporaryDirectory(prefix="handover-") as sources:
+        wheel = build_wheel(copy_sources(Path(sources) / "handover"), host_platform())
+        pip = [sys.executable, "-m", "pip", "--python", str(environment / "bin" / "python")]
+        subprocess.run([*pip, "install", "--quiet", "--no-deps", wheel], check=True)
+    _describe(environment)
+    whole.write_text(code_key())
 
 
 def _describe(environment: Path) -> None:

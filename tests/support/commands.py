@@ -26,7 +26,7 @@ from click.testing import CliRunner, Result
 
 from handover.scenarios.cli.command import main
 
-_LOADED = (
+LOADED = (
     "control",
     "handover.cosim.check.load_probe",
     "handover.cosim.check.smoke_run",
@@ -155,7 +155,7 @@ def cpu_of_commands() -> float:
 def forking() -> ForkServerContext:
     """Return what forks processes from the warm one."""
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(list(_LOADED))
+    context.set_forkserver_preload(list(LOADED))
     return context
 
 

@@ -10,9 +10,10 @@ import shutil
 import sys
 import time
 from collections.abc import Generator
-from functools import cache
+from functools import cache, partial
 from importlib.metadata import distributions
 from pathlib import Path
+from typing import Any
 
 import handover
 from handover.cosim.files import FileLocked, lock_file
@@ -28,21 +29,23 @@ _KEPT_FOR = 86_400.0
 """Seconds for which runs of other code are kept, as of another branch."""
 
 
-def kept_run(*arguments: str) -> Path:
+def kept_run(*arguments: str, before: tuple[Any, ...] = ()) -> Path:
     """Return the folder that `handover ARGUMENTS --out FOLDER` writes; it must not be changed.
 
     `kept_run("run", "ir_grasp")` has the record, figures and page, `kept_run("run", "ir_grasp", "--no-report")` neither
-    figures nor page, at a third of the time. A run that is judged to have failed is one, too.
+    figures nor page, at a third of the time. A run that is judged to have failed is one, too. `before`, if given, is a
+    module's function with its arguments, which is called in the command's process first.
     """
     of_code = _KEPT / code_key()
-    folder = of_code / hashlib.sha256(repr(arguments).encode()).hexdigest()[:16]
+    folder = of_code / hashlib.sha256(repr((arguments, *before[1:])).encode()).hexdigest()[:16]
     wanted = folder / arguments[1].rpartition("/")[2]
     of_code.mkdir(parents=True, exist_ok=True)
     with _locked(folder.with_suffix(".lock")):
         if not (folder / "whole").exists():
             shutil.rmtree(folder, ignore_errors=True)
             folder.mkdir()
-            done = Command(*arguments, "--out", wanted, cwd=folder).wait(_MOST)
+            first = partial(*before) if before else None
+            done = Command(*arguments, "--out", wanted, cwd=folder, before=first).wait(_MOST)
             assert done.status in (0, 1), done.output + done.errors  # 1: the robot failed
             assert arguments[0] != "run" or (wanted / "summary.json").is_file(), done.output + done.errors
             (folder / "whole").touch()
