@@ -50,7 +50,7 @@ class Outputs:
     impedance: bool = output("impedance control is on")
     pose: bool = output("pose control is on")
     closure: Number = output("gripper command: 0 open, 1 closed", minimum=0.0, maximum=1.0)
-    light: bool = output("signal light: its beginning tells the person that the robot is ready")
+    light: bool = output("signal light: it begins when the robot is ready")
     failed_receptions: int = output("times that the gripper closed on nothing", minimum=0.0)
     failed_deliveries: int = output(
         "times that what it had released was still between the fingers, or what it had not was gone", minimum=0.0

@@ -59,7 +59,7 @@ class Params:
         minimum=-1.5,
         maximum=1.5,
     )
-    ahead: Radian = parameter(0.47, "angle of the second sensor's beam likewise", minimum=-1.5, maximum=1.5)
+    ahead: Radian = parameter(0.47, "angle of the second sensor's beam from that normal", minimum=-1.5, maximum=1.5)
     ball_radius: Metre = parameter(0.025, "radius of the ball", minimum=0.001, maximum=0.1)
     ball_reflectivity: Number = parameter(
         1.0, "reflectivity of the ball over the reference's", minimum=0.0, maximum=2.0
@@ -123,7 +123,7 @@ class Outputs:
     """What the converters read."""
 
     ticks: Vector6[Tick] = output(
-        "reading of the sensors that look across, one a finger, then of those that look ahead, likewise"
+        "reading of the sensors that look across, one a finger, then of those that look ahead"
     )
 
 

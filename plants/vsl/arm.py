@@ -63,7 +63,7 @@ class Outputs:
     p_meas: Vector2[Pascal] = output("pressures of links 2 and 3 by the transducers")
     p_meas_4: Pascal = output("pressure of the third of three links by its transducer; of fewer: 0")
     tilt_meas: Vector2[Radian] = output("angles of the ends of links 2 and 3 above the horizontal, by accelerometers")
-    tilt_meas_4: Radian = output("angle of the end of the third of three links likewise; of fewer: 0")
+    tilt_meas_4: Radian = output("angle of the end of the third of three links above the horizontal; of fewer: 0")
     p_WG: Vector3[Metre] = output("position of the gripper")
     p_WG_meas: Vector3[Metre] = output("position of the gripper by the tracker")
     f_G: Newton = output("largest force within the step of the face that stops the gripper, upwards")

@@ -87,7 +87,7 @@ def split_units(
         faults += [f"--unit {name}: {item} is given twice" for item in dict.fromkeys(items) if items.count(item) > 1]
         if name in {v.name for v in experiment.parameters()}:
             faults.append(
-                f"--unit {name}: {experiment.name} has a parameter of that name, which a table could not tell"
+                f"--unit {name}: {experiment.name} has a parameter of that name, and a table has one column of it"
             )
     if faults:
         raise InvalidParameter(faults)

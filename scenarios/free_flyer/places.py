@@ -19,7 +19,11 @@ _WRENCH = {"f_B": "at the centre of mass, in B", "tau_B": "in B"}
 _ON_GRIPPER = {"f_G": "at G, in W", "tau_G": "in W"}
 _AT_GRIPPER = {"p_WG": "in W", "q_WG": "scalar first", "v_WG": "in W"}
 _MOTION = {**_AT_GRIPPER, "w_WG": "in W"}
-_BODY = {"mass": "as the scenario's factors make it", "I_B": "in B, likewise", "p_BG": "in B, likewise"}
+_BODY = {
+    "mass": "as the scenario's factors make it",
+    "I_B": "in B, by the same factors",
+    "p_BG": "in B, by the same factors",
+}
 _CONTROLLER = Place(
     required={"f_cmd": "at the centre of mass, in B", "tau_cmd": "in B"},
     optional={
@@ -92,8 +96,8 @@ PLACES_OF_PUSH = {
 _ARM = {
     "joints": "the scenario's parameter",
     "link": "in B, as the scenario's factors make it",
-    "mass_L": "likewise",
-    "I_L": "likewise",
+    "mass_L": "as the scenario's factors make it",
+    "I_L": "as the scenario's factors make it",
 }
 
 PLACES_OF_ARM_PUSH = {
@@ -272,7 +276,7 @@ PLACES_OF_TEAM = {
             "grippers_holding": "by it the run is judged",
             "hands_holding": "by it the run is judged",
             "motion": "follows from the scenario's parameter task",
-            "object_with": "likewise",
+            "object_with": "follows from the scenario's parameter task",
         },
         optional={
             "activity": "shown as a signal",
@@ -281,7 +285,7 @@ PLACES_OF_TEAM = {
             "angle_0": "",
             **dict.fromkeys(("object_mass", "hand_delay", "interface_delay"), "the scenario's parameter"),
             "p_OG": "as the unit decision has it",
-            "grip_spacing": "likewise",
+            "grip_spacing": "as the unit decision has it",
             **dict.fromkeys(("hands", "p_OH"), "follows from the scenario's parameter hands"),
             **dict.fromkeys(
                 ("effort", "arm_force_max"), "follows from the scenario's parameter strength, of each hand"

@@ -36,7 +36,7 @@ PLACES = {
             "p_WG_model": "in W; compared with goal and tip",
             "p_WG_est": "in W; compared with the tip",
             "outside": "its share of the path is a metric",
-            "model_mismatch": "likewise, where tracker or IMUs are wired",
+            "model_mismatch": "its share is a metric where tracker or IMUs are wired",
             "innovation": "in W",
             "method": "the scenario's",
             "elbow": "the scenario's parameter",

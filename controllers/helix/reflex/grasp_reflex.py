@@ -73,7 +73,7 @@ class Params:
         minimum=-1.5,
         maximum=1.5,
     )
-    ahead: Radian = parameter(0.47, "angle of the second sensor's beam likewise", minimum=-1.5, maximum=1.5)
+    ahead: Radian = parameter(0.47, "angle of the second sensor's beam from that normal", minimum=-1.5, maximum=1.5)
     ball_radius: Metre = parameter(0.025, "expected radius of the ball", minimum=0.001, maximum=0.1)
     palm_radius: Metre = parameter(
         0.045, "how far the palm under the ball is expected to reach", minimum=0.0, maximum=0.2

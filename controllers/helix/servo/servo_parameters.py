@@ -68,7 +68,9 @@ class Params:
         minimum=0.0,
     )
     L_sys_UB: Vector6[Number] = parameter(
-        np.array([math.pi / 4, 0.14, math.pi / 2, 0.26, math.pi / 2, 0.26]), "upper bounds likewise", minimum=0.0
+        np.array([math.pi / 4, 0.14, math.pi / 2, 0.26, math.pi / 2, 0.26]),
+        "upper bounds of d_1, l_1, d_2, l_2, d_3, l_3 (rad, m)",
+        minimum=0.0,
     )
     A_pose_upd: Vector9[Number] = parameter(
         np.array([1.0, 1.0, 5.0, 1.05, 1.05, 5.25, 1.1, 1.1, 5.5]),

@@ -75,7 +75,9 @@ class Params(ContactParams):
         0.50, "between the grippers' handles, along y; the first is at +y", minimum=0.0, maximum=2.0
     )
     hands: int = parameter(2, "how many hands the person uses", minimum=1, maximum=2)
-    hand_spacing: Metre = parameter(0.50, "between the hands' handles, likewise", minimum=0.0, maximum=2.0)
+    hand_spacing: Metre = parameter(
+        0.50, "between the hands' handles, along y; the first is at +y", minimum=0.0, maximum=2.0
+    )
     hand_delay: Second = parameter(
         0.0, "how much later than the first the second hand closes and opens", minimum=0.0, maximum=10.0
     )

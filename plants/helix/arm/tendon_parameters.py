@@ -77,7 +77,9 @@ class Params:
     tendon_stiffness: NewtonPerMetre = parameter(
         1e4, "stiffness of a tendon of its calibrated length", minimum=100.0, maximum=1e6
     )
-    tendon_damping: NewtonSecondPerMetre = parameter(10.0, "damping of a tendon likewise", minimum=0.0, maximum=1e4)
+    tendon_damping: NewtonSecondPerMetre = parameter(
+        10.0, "damping of a tendon of its calibrated length", minimum=0.0, maximum=1e4
+    )
     slack_force: Newton = parameter(
         0.005, "largest push of a slack tendon, which the solver needs", minimum=1e-4, maximum=1.0
     )

@@ -161,7 +161,7 @@ class Params:
         maximum=1.0,
     )
     hide_ball_within: Metre = parameter(
-        0.0, "distance likewise from which on a card hides the ball; 0: never", minimum=0.0, maximum=1.0
+        0.0, "distance of gripper and ball from which on a card hides the ball; 0: never", minimum=0.0, maximum=1.0
     )
     p_WD: Vector3[Metre] = parameter(
         np.array([0.0, -0.16, -0.78]), "middle of the bowl's rim in the world, where there is a bowl"
