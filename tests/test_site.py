@@ -21,6 +21,7 @@ import pytest
 from support.documentation import ROOT
 
 import handover
+from handover.cosim.blocks.description import describe
 from handover.fmus.catalog import UNITS, import_class
 from handover.scenarios.catalog import SCENARIOS, SYSTEMS
 from handover.scenarios.cli.command import main
@@ -124,9 +125,8 @@ def test_a_value_without_an_origin_is_named(monkeypatch: pytest.MonkeyPatch):
 
 def test_an_equation_that_a_docstring_no_longer_has_is_named():
     equations = maker("equations")
-    assert r"$\ddot z = -g$" in equations.with_latex(
-        "VacuumGripper", import_class(UNITS["VacuumGripper"].block).__doc__
-    )
+    docs = {unit: equations.with_latex(unit, describe(import_class(e.block)).doc) for unit, e in UNITS.items()}
+    assert r"$\ddot z = -g$" in docs["VacuumGripper"]
     with pytest.raises(equations.EquationGone, match="VacuumGripper no longer has"):
         equations.with_latex("VacuumGripper", "Holds an object.")
 
