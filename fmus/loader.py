@@ -188,7 +188,10 @@ class _PrivateModules:
         self.builtins = {**vars(builtins), "__import__": self.import_from}
 
     def move_to(self, folder: str) -> None:
-        """Take what is not loaded yet from another folder of the same FMU."""
+        """Take what is not loaded yet, and data, from another folder of the same FMU."""
+        for full, module in list(sys.modules.items()):
+            if full.startswith(f"{self.prefix}.") and module.__file__ is not None:
+                module.__file__ = folder + module.__file__[len(self.folder) :]
         self.folder = folder
         self.own = {}  # the other folder may have been incomplete
 

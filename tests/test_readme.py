@@ -152,7 +152,7 @@ def test_a_unit_brings_its_interpreter(folder: Path):
 def test_data_beside_a_unit_goes_along_with_it(tmp_path: Path):
     (option,) = re.findall(r"`(--include (?:\S+))`", TEXT)
     file = option.split()[1]
-    read = f"        self.k = params.k * float(Path(__file__).with_name({file!r}).read_text())\n"
+    read = f"        self.k = params.k * float(Path(__file__).parent.joinpath({file!r}).read_text())\n"
     block = OWN_BLOCK.replace("        self.k = params.k\n", read)
     assert read in block
     (tmp_path / "tabled.py").write_text(f"from pathlib import Path\n\n{block}")

@@ -40,9 +40,6 @@ __all__ = [
     "UnusedParameters",
 ]
 
-MODELS = Path(__file__).with_name("models")
-"""Folder of the models that ship."""
-
 _SHIPPED = {
     (Learned.CUBIC, False): "cubic",
     (Learned.CUBIC, True): "friction",
@@ -347,6 +344,11 @@ def _idle(p: Params) -> list[str]:
     return [f"{name}: without effect with method=MODEL_BASED, which uses nothing that was learned" for name in given]
 
 
+def shipped_file(name: str) -> Path:
+    """Return the file of a model that ships: cubic, friction (cubic, of currents without friction), small, physics."""
+    return Path(__file__).with_name("models") / f"{name}.json"
+
+
 def _model(p: Params, kinematics: VslKinematics) -> VslModel:
     """Return the model to be used.
 
@@ -359,7 +361,7 @@ def _model(p: Params, kinematics: VslKinematics) -> VslModel:
     if p.model:
         model = read_model(Path(p.model))
     elif name := _SHIPPED.get((p.learned, p.friction_compensation)):
-        model = read_model(MODELS / f"{name}.json")
+        model = read_model(shipped_file(name))
     else:
         raise InvalidModel(source, "there is none: train one and name its file by the parameter model", remedy)
     if model.kind is not p.learned:

@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 
 from handover.controllers.vsl.feedback import CurrentFilter, ImuTip, ModelMonitor, TipFeedback, VibrationDamping
 from handover.controllers.vsl.fit import directions_of
-from handover.controllers.vsl.hybrid_kinematics import MODELS, Inputs
+from handover.controllers.vsl.hybrid_kinematics import Inputs, shipped_file
 from handover.controllers.vsl.learned_model import Adapted, VslModel, friction_direction, inputs_of
 from handover.controllers.vsl.model_text import read_model
 from handover.cosim.blocks.ports import Floats
 
-FRICTION_MODEL, MODEL = (read_model(MODELS / f"{kind}.json") for kind in ("friction", "cubic"))
+FRICTION_MODEL, MODEL = (read_model(shipped_file(kind)) for kind in ("friction", "cubic"))
 ARM = MODEL.kinematics
 Q = ARM.inverse(np.array([0.35, 0.0, 0.15]))
 P = np.array([1e5, 1e5])
@@ -126,7 +126,7 @@ def test_a_velocity_that_begins_is_commanded_ahead_once():
     assert not unit.step(0.02, reading(q[2], qd_ref=off_the_path), i, np.zeros(2))
 
 
-SMALL, PHYSICS = (read_model(MODELS / f"{kind}.json") for kind in ("small", "physics"))
+SMALL, PHYSICS = (read_model(shipped_file(kind)) for kind in ("small", "physics"))
 ADAPTED = dataclasses.replace(
     PHYSICS, inverse=Adapted(PHYSICS.inverse, np.zeros(3), np.full((3, 7), 1e-3), 0.1 * np.eye(3))
 )

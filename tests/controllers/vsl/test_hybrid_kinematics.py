@@ -10,7 +10,6 @@ from support.restored_states import assert_continues, assert_outputs_change_noth
 from support.wording import Wording
 
 from handover.controllers.vsl.hybrid_kinematics import (
-    MODELS,
     Elbow,
     HybridKinematics,
     Imu,
@@ -21,13 +20,14 @@ from handover.controllers.vsl.hybrid_kinematics import (
     Outputs,
     Params,
     UnusedParameters,
+    shipped_file,
 )
 from handover.controllers.vsl.kinematics import VslKinematics
 from handover.controllers.vsl.learned_model import Cubic
 from handover.controllers.vsl.model_text import model_text, read_model
 
 ARM = VslKinematics(0.15, 0.225, 0.225, Elbow.UP)
-MODEL = read_model(MODELS / "cubic.json")
+MODEL = read_model(shipped_file("cubic"))
 Q = ARM.inverse(np.array([0.35, 0.0, 0.15]))
 USUAL = Inputs(
     q_ref=Q,
@@ -40,8 +40,8 @@ RIGID = Params(method=Method.MODEL_BASED)
 ESTIMATE = Params(method=Method.ESTIMATE)
 SHIPPED = {
     Learned.CUBIC: MODEL,
-    Learned.SMALL: read_model(MODELS / "small.json"),
-    Learned.PHYSICS: read_model(MODELS / "physics.json"),
+    Learned.SMALL: read_model(shipped_file("small")),
+    Learned.PHYSICS: read_model(shipped_file("physics")),
 }
 ALL = [
     RIGID,
@@ -112,7 +112,7 @@ def test_the_closed_loop_raises_a_tip_that_is_too_low(method: Method):
 
 def test_friction_compensation_forgets_no_turn():
     """Of an arm whose currents carry friction by the direction of its commands, the currents are seen without."""
-    frictionless = read_model(MODELS / "friction.json")
+    frictionless = read_model(shipped_file("friction"))
     unit = HybridKinematics(Params(friction_compensation=True, i_lag=0.0))
     for k in range(10):
         q = USUAL.q_ref + 0.01 * k * np.array([0.0, 1.0, -1.0])
@@ -192,8 +192,8 @@ def test_a_model_that_is_not_what_the_parameters_say_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wording: Wording
 ):
     monkeypatch.chdir(tmp_path)
-    shutil.copyfile(MODELS / "cubic.json", "cubic")
-    shutil.copyfile(MODELS / "friction.json", "frictionless")
+    shutil.copyfile(shipped_file("cubic"), "cubic")
+    shutil.copyfile(shipped_file("friction"), "frictionless")
     for params in (
         Params(learned=Learned.PUBLISHED),
         Params(learned=Learned.SMALL, friction_compensation=True),

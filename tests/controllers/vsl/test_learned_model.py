@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from support.wording import Wording
 
 from handover.controllers.vsl.fit import fit_adapted, fit_cubic, fit_friction
-from handover.controllers.vsl.hybrid_kinematics import MODELS
+from handover.controllers.vsl.hybrid_kinematics import shipped_file
 from handover.controllers.vsl.kinematics import Elbow, VslKinematics
 from handover.controllers.vsl.learned_model import (
     Cubic,
@@ -51,7 +51,7 @@ def model() -> VslModel:
 
 
 KINDS = ["cubic", "small", "physics", "friction"]
-SHIPPED = [(MODELS / f"{kind}.json").read_text() for kind in KINDS]
+SHIPPED = [(shipped_file(kind)).read_text() for kind in KINDS]
 
 
 def slopes(f: Callable[[Floats], Floats], at: Floats, step: float) -> Floats:
@@ -127,7 +127,7 @@ def test_the_corrected_jacobian_is_the_derivative_of_the_tip(text: str):
 
 
 def test_a_published_model_gives_angles_and_position_themselves():
-    cubic, m = read_model(MODELS / "cubic.json").forward, model()
+    cubic, m = read_model(shipped_file("cubic")).forward, model()
     assert isinstance(cubic, Cubic)
     by_X = Cubic(np.array([0.3, 0.0, 0.15, *cubic.mean[3:]]), cubic.scale, cubic.hull, cubic.powers, cubic.coefficients)
     q, p, i = np.array([0.3, 0.6, -1.2]), np.array([0.9e5, 1.2e5]), np.array([0.0, 0.7, 0.15])

@@ -62,6 +62,19 @@ def test_a_second_instance_finds_its_modules_though_the_first_ones_folder_is_gon
     assert "return [][0]" in hosts[0].log[-1]
 
 
+def test_a_second_instance_reads_data_beside_its_own_modules(tmp_path: Path):
+    (folder := tmp_path / "with_data").mkdir()
+    (folder / "table.csv").write_text("2.5")
+    fmu = build_in(folder, "float(__import__('pathlib').Path(__file__).with_name('table.csv').read_text())")
+    (folder / "table.csv").unlink()
+    for _ in range(2):
+        host = CtypesHost(fmu, 3)
+        assert host.instantiate(), host.log
+        assert host.initialise() == OK, host.log
+        assert host.get("y") == [2.5]
+        host.close()
+
+
 def edited(host: CtypesHost, **changed: object) -> None:
     """Change what stands in an unpacked unit's facts."""
     file = host.folder / "resources" / "unit.json"

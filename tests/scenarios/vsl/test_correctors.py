@@ -11,7 +11,7 @@ from click.testing import CliRunner
 from support.wording import Wording
 
 from handover.controllers.vsl.beam import HINGES, Beam, Stiffness, Weights
-from handover.controllers.vsl.hybrid_kinematics import MODELS
+from handover.controllers.vsl.hybrid_kinematics import shipped_file
 from handover.controllers.vsl.kinematics import Elbow, VslKinematics
 from handover.cosim.exceptions import InitializationError
 from handover.cosim.master.master import Master
@@ -100,7 +100,7 @@ def test_a_gain_of_damping_without_friction_compensation_and_imus_beside_a_track
 
 
 def test_a_network_that_does_not_ship_and_a_model_of_another_kind_are_refused(tmp_path: Path, wording: Wording):
-    shutil.copyfile(MODELS / "cubic.json", tmp_path / "m.json")
+    shutil.copyfile(shipped_file("cubic"), tmp_path / "m.json")
     for given in (("learned=published",), ("learned=physics", f"model={tmp_path / 'm.json'}")):
         with pytest.raises(InitializationError) as refused, Master(wired(*given)):
             pass

@@ -9,7 +9,7 @@ from support.scenarios.vsl_training_points import ARM, TRAINING, call, made_up, 
 from support.wording import Wording
 
 from handover.controllers.vsl.fit import directions_of
-from handover.controllers.vsl.hybrid_kinematics import MODELS, HybridKinematics, Inputs, Params
+from handover.controllers.vsl.hybrid_kinematics import HybridKinematics, Inputs, Params, shipped_file
 from handover.controllers.vsl.learned_model import ForwardInput, Learned
 from handover.controllers.vsl.model_text import model_text, parse_model, read_model
 from handover.cosim.exceptions import InvalidFmu
@@ -108,7 +108,7 @@ def present() -> Measured:
 
 @pytest.mark.parametrize("kind", ["cubic", "friction", "small", "physics"])
 def test_the_models_that_ship_know_the_present_arm(kind: str, present: Measured):
-    model = read_model(MODELS / f"{kind}.json")
+    model = read_model(shipped_file(kind))
     usable = present.points.rows(present.order >= 0)
     points = usable.without_friction(directions_of(usable.q_cmd[:, 1:], Params().reversal), model.friction)
     errors, stated = TRAINING.like(model).residuals.errors(model, points), model.provenance["mean_test_errors_m"]

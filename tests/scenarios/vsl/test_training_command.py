@@ -18,7 +18,7 @@ import pytest
 from support.scenarios.vsl_training_points import TRAINING, Trained, call, made_up, nobody, shipped
 from support.wording import Wording
 
-from handover.controllers.vsl.hybrid_kinematics import MODELS, HybridKinematics, InvalidModel, Params
+from handover.controllers.vsl.hybrid_kinematics import HybridKinematics, InvalidModel, Params, shipped_file
 from handover.controllers.vsl.kinematics import Elbow
 from handover.controllers.vsl.learned_model import ForwardInput, VslModel
 from handover.controllers.vsl.model_text import read_model
@@ -101,7 +101,7 @@ def test_model_and_data_are_written_before_the_curve(tmp_path: Path, monkeypatch
 
 @pytest.mark.slow
 def test_a_model_is_adapted_to_stiffer_links_by_few_points(tmp_path: Path):
-    shutil.copyfile(MODELS / "cubic.json", tmp_path / "m.json")
+    shutil.copyfile(shipped_file("cubic"), tmp_path / "m.json")
     stiffer = ("--arm", "EI_0=0.605", "--arm", "EI_p=1.155e-5")
     result = call("--adapt", tmp_path / "m.json", "--points", "50", *stiffer, "--out", tmp_path / "a.json")
     assert result.exit_code == 0, result.output

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from click.testing import CliRunner, Result
 
-from handover.controllers.vsl.hybrid_kinematics import MODELS
+from handover.controllers.vsl.hybrid_kinematics import shipped_file
 from handover.controllers.vsl.kinematics import Elbow, VslKinematics
 from handover.controllers.vsl.learned_model import VslModel
 from handover.controllers.vsl.model_text import read_model
@@ -66,4 +66,4 @@ def made_up(n: int, seed: int = 2) -> Measured:
 
 
 def shipped() -> VslModel:
-    return read_model(MODELS / "cubic.json")
+    return read_model(shipped_file("cubic"))
