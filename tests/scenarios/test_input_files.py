@@ -28,7 +28,7 @@ READERS: dict[str, Callable[[Path], object]] = {
     "stimulus": lambda file: read_stimulus(file, {}),
     "unit": describe_fmu,
     "VSL model": read_model,
-    "VSL points": lambda file: read_data(file, "", VslKinematics(0.1, 0.1, 0.1, Elbow.UP)),
+    "VSL points": lambda file: read_data(file, VslKinematics(0.1, 0.1, 0.1, Elbow.UP)),
     "waypoints": read_waypoints,
 }
 
