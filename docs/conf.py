@@ -32,6 +32,7 @@ autodoc_member_order = "bysource"
 add_module_names = False
 default_role = "literal"
 smartquotes = False
+highlight_language = "none"
 
 # Tutorials: executed in an empty folder each, again where the product has changed.
 _TUTORIALS = Path(__file__).parent / "build" / "tutorials"
@@ -54,6 +55,7 @@ html_static_path = ["static"]
 html_css_files = ["site.css"]
 html_theme_options = {"sidebar_hide_name": False, "navigation_with_keys": True}
 html_copy_source = False
+html_show_search_summary = False  # excerpts are fetched, which a page that is opened as a file cannot do
 html_extra_path = ["build/files"]
 copybutton_exclude = ".linenos, .gp, .go"
 
