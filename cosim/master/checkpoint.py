@@ -17,7 +17,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.exceptions import CosimError, one_line
@@ -27,7 +27,7 @@ from handover.cosim.master.master import Master
 from handover.cosim.record.recorder import Recorder
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System
-from handover.cosim.typed_data import Count, decoded
+from handover.cosim.typed_data import Count, ExactTime, NotNegative, checked, decoded
 
 _log = logging.getLogger(__name__)
 
@@ -194,6 +194,31 @@ class _Format:
     format: int
 
 
+class _Statistics(TypedDict):
+    accepted: Count
+    rejected: Count
+    shortest: NotNegative
+    longest: NotNegative
+
+
+class _Timing(TypedDict):
+    ticks: dict[str, ExactTime | None]
+
+
+class _StepperState(TypedDict, total=False):
+    """What steppers keep, as far as it is numbers; times are ticks, or exact seconds."""
+
+    tick: Count
+    now: ExactTime
+    wanted: Count
+    due: dict[str, Count | ExactTime]
+    acted: dict[str, int | ExactTime]
+    courses: dict[str, tuple[ExactTime, ExactTime, bool]]
+    units: dict[str, _Timing]
+    controller: dict[str, float | None]
+    statistics: _Statistics
+
+
 @dataclass(frozen=True)
 class _Header:
     """What `checkpoint.json` holds; earlier versions kept no warnings."""
@@ -234,7 +259,7 @@ def read_checkpoint(path: Path) -> Checkpoint:
             return Checkpoint(
                 time=header.time,
                 rows=header.rows,
-                stepper=header.stepper,
+                stepper=checked(header.stepper, _StepperState),
                 units={name: read(f"{i}.state") for i, name in enumerate(names)},
                 contents={name: unpack_state(read(f"{i}.contents")) for i, name in enumerate(names)},
                 cpu={name: read(f"{i}.cpu") for i, name in enumerate(names)},

@@ -2,9 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from decimal import Decimal
 from fractions import Fraction
 
 from handover.cosim.fmu.file.xml import XmlElement
+
+_MOST_DIGITS = 400
+"""Before the decimal point or behind it; an exact number of 1e999999999 would take minutes."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,6 +75,8 @@ def _seconds(e: XmlElement, what: str) -> Fraction | None:
     try:
         if counter and resolution:
             return Fraction(int(counter), int(resolution))
+        if decimal and abs(Decimal(decimal).adjusted()) > _MOST_DIGITS:
+            raise ValueError(f"{decimal[:40]} is not of a size that a double can have")
         return Fraction(decimal) if decimal else None
-    except (ValueError, ZeroDivisionError) as error:
+    except (ArithmeticError, ValueError) as error:
         raise ValueError(f"the {what} of its clock {e.get('name')!r} is not a number: {error}") from error

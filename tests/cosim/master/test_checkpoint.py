@@ -204,6 +204,24 @@ def test_what_is_no_checkpoint_is_refused(tmp_path: Path, wording: Wording):
         wording.check(caught.value)
 
 
+@pytest.mark.parametrize(
+    "stepper",
+    [
+        {"now": "1e999999999"},
+        {"due": {"a": "1e999999999"}},
+        {"courses": {"a": ["0", "1e999999999", False]}},
+        {"units": {"a": {"ticks": {"clock": "1e999999999"}}}},
+        {"statistics": {"accepted": 1, "rejected": "x", "shortest": 0.1, "longest": 0.2}},
+        {"statistics": {"accepted": 1, "rejected": 0, "shortest": None, "longest": 0.2}},
+    ],
+    ids=lambda stepper: next(iter(stepper)),
+)
+def test_times_and_counts_of_a_stepper_are_checked_when_they_are_read(stepper: dict[str, Any], tmp_path: Path):
+    write_checkpoint(tmp_path / "c.zip", replace(_some(), stepper=stepper))
+    with pytest.raises(InvalidCheckpoint, match=next(iter(stepper))):
+        read_checkpoint(tmp_path / "c.zip")
+
+
 @given(st.data())
 @settings(max_examples=40)
 def test_a_damaged_checkpoint_is_reported_or_is_what_was_written(

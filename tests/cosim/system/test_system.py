@@ -185,6 +185,10 @@ def test_a_unit_with_clocked_ports_is_not_taken_for_a_sampled_one_nor_a_clock_th
     file = edited("counter_tenths", 3, ('intervalCounter="1"', 'intervalCounter="0"'))
     with pytest.raises(InvalidFmu, match=r"its clock 'tick' ticks every 0 s from 0 s on"):
         describe_fmu(file)
+    counted = 'intervalCounter="1" resolution="10" intervalDecimal="0.1"'
+    file = edited("counter_tenths", 3, (counted, 'intervalDecimal="1e999999999"'))
+    with pytest.raises(InvalidFmu, match=r"its clock 'tick' is not a number: 1e999999999 "):
+        describe_fmu(file)
 
 
 def test_clock_connections_are_not_exported_silently(tmp_path: Path):
