@@ -1,18 +1,51 @@
-"""The process that serves instances, at its limit of open files."""
+"""The process that serves instances: what is left of one that has ended, and its limit of open files."""
 
 import contextlib
+import gc
 import os
 import socket
 import subprocess
 import sys
 import time
+import weakref
+import zipfile
+from pathlib import Path
 
 import pytest
 
 import handover.fmus.server
-from handover.fmus.server import ANSWER, CALL, RAISED
+from handover.fmus.build import cached
+from handover.fmus.server import ANSWER, CALL, RAISED, Channel, Server
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="the channel is a pipe there")
+
+
+def test_nothing_is_left_of_an_instance_that_has_ended(tmp_path: Path):
+    with zipfile.ZipFile(cached("Push", 3)) as archive:
+        archive.extractall(tmp_path)
+        token = archive.read("resources/unit.json").decode().partition('"token": "')[2].partition('"')[0]
+    start = f"{token}\n{tmp_path / 'resources'}".encode()
+    host, ours = socket.socketpair()
+    host.sendall(CALL.pack(b"start", -1, len(start), True) + start)
+    host.sendall(CALL.pack(b"initialise", -1, 0, False))
+    host.shutdown(socket.SHUT_WR)
+    memory = os.open(tmp_path / "memory", os.O_RDWR | os.O_CREAT)
+    server = Server(Channel(ours.fileno()), memory)
+    gc.collect()
+    gc.disable()
+    try:
+        with contextlib.suppress(SystemExit):
+            server.run()
+        answers = host.recv(1 << 20)
+        left = [weakref.ref(server), weakref.ref(server._memory)]  # type: ignore
+        del server
+        assert [reference() for reference in left] == [None, None]
+        with pytest.raises(OSError, match="Bad file descriptor"):
+            os.fstat(memory)
+    finally:
+        gc.enable()
+    assert ANSWER.unpack(answers[: ANSWER.size])[0] == 0, answers
+    assert answers.endswith(ANSWER.pack(0, 0))
 
 
 @pytest.mark.skipif(not hasattr(socket, "send_fds"), reason="descriptors are not sent there")

@@ -18,6 +18,7 @@ from handover.fmus.standalone import freezer, program, smoke_test
 from handover.fmus.standalone.freezer import (
     PROGRAM,
     CannotFreeze,
+    _contents,  # type: ignore
     _freeze,  # type: ignore
     _imported,  # type: ignore
     _key,  # type: ignore
@@ -63,6 +64,38 @@ _installed = functools.cache(freezer.distributions_by_module)
 @pytest.fixture(autouse=True)
 def of_all_installed_asked_once(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(freezer, "distributions_by_module", _installed)
+
+
+@pytest.fixture
+def frozen(tmp_path: Path) -> Path:
+    """Return a frozen folder: a package's libraries, and one in the package's own folder."""
+    folder = tmp_path / "frozen"
+    for name in ("unit", "_internal/numpy.libs/libblas.so", "_internal/llvm/libllvm.so"):
+        file = folder / name
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(name)
+    return folder
+
+
+def test_what_links_lead_to_stands_in_their_places(frozen: Path):
+    (frozen / "_internal/libblas.so").symlink_to("numpy.libs/libblas.so")
+    (frozen / "_internal/libllvm.so").symlink_to("llvm/libllvm.so")
+    (frozen / "_internal/Current").symlink_to("llvm")
+    blas, llvm = b"_internal/numpy.libs/libblas.so", b"_internal/llvm/libllvm.so"
+    assert _contents(frozen) == {
+        "unit": b"unit",
+        "_internal/libblas.so": blas,
+        "_internal/llvm/libllvm.so": llvm,
+        "_internal/libllvm.so": llvm,
+        "_internal/Current/libllvm.so": llvm,
+    }
+
+
+@pytest.mark.parametrize("target", ["nothing", "..", "../.."])
+def test_a_link_that_leads_nowhere_or_to_where_it_lies_is_refused(frozen: Path, target: str):
+    (frozen / "_internal/link").symlink_to(target)
+    with pytest.raises(CannotFreeze, match=f"the symbolic link _internal/link to {target},"):
+        _contents(frozen)
 
 
 def test_another_version_of_a_package_that_another_one_imports_is_frozen_anew(monkeypatch: pytest.MonkeyPatch):
