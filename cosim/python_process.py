@@ -6,12 +6,13 @@ installed, a process would take the clone's modules, and the one that started it
 which this process imports are handed over, and nothing is imported before they are set.
 """
 
+import contextlib
 import functools
 import os
 import site
 import sys
 import sysconfig
-from collections.abc import Sequence
+from collections.abc import Generator, Mapping, Sequence
 from pathlib import Path
 
 _MODULE = "import runpy; runpy.run_module(sys.argv.pop(1), None, '__main__', True)"
@@ -52,6 +53,21 @@ def import_path() -> list[str]:
 def without_safe_path() -> dict[str, str]:
     """Return the environment of a process that runs other people's code, without `SAFE_PATH` where we have set it."""
     return {name: value for name, value in os.environ.items() if (name, value) not in SAFE_PATH.items()}
+
+
+@contextlib.contextmanager
+def environment_changed(changes: Mapping[str, str]) -> Generator[None, None, None]:
+    """Set variables of this process's environment, for processes that a library starts meanwhile."""
+    before = {name: os.environ.get(name) for name in changes}
+    os.environ.update(changes)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
 
 
 def is_installed(path: Path) -> bool:

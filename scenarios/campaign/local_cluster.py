@@ -13,7 +13,7 @@ from dask import config
 from distributed import Client, LocalCluster
 
 from handover.cosim.exceptions import one_line
-from handover.cosim.python_process import SAFE_PATH
+from handover.cosim.python_process import SAFE_PATH, environment_changed
 from handover.scenarios.campaign.cluster import ClusterPool
 from handover.scenarios.campaign.worker_pool import cores
 from handover.scenarios.execution.errors import PoolError
@@ -117,16 +117,8 @@ def _environment_of_resource_tracker() -> Generator[None, None, None]:
     """
     warned = filter(None, [os.environ.get("PYTHONWARNINGS"), "ignore:resource_tracker:UserWarning"])
     changed = {"PYTHONWARNINGS": ",".join(warned), **SAFE_PATH}
-    before = {name: os.environ.get(name) for name in changed}
-    os.environ.update(changed)
-    try:
+    with environment_changed(changed):
         yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
 
 
 @contextlib.contextmanager

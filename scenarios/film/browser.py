@@ -1,15 +1,19 @@
 """Draws a film's page in Chromium without a window, by Playwright, and takes a screenshot of each frame."""
 
 import base64
+import os
 import shutil
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, Protocol, cast
 
 from playwright.sync_api import Browser, Page, Playwright, sync_playwright
 from playwright.sync_api import Error as PlaywrightError
 
 from handover.cosim.exceptions import one_line
+from handover.cosim.files import scratch_folder
+from handover.cosim.python_process import environment_changed
 
 _FLAGS = (
     "--disable-gpu", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--hide-scrollbars",
@@ -18,6 +22,8 @@ _FLAGS = (
 """Space is drawn by software, which gives the same pictures on any machine."""
 _NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "msedge", "microsoft-edge")
 """Of the system's own browsers."""
+_TEMPORARY = ("TMPDIR", "TEMP", "TMP")
+"""Variables that name the folder of temporary files, on POSIX and on Windows."""
 _PATIENCE = 300_000
 """How long the page may take to be drawn, or a frame of it, ms."""
 _SCALES = (4.0, 3.0, 2.5, 2.0, 1.5, 1.25)
@@ -63,7 +69,7 @@ def open_camera(html: str, size: tuple[int, int], *, dark: bool) -> Generator[Ca
         BrowserFailed: it could not draw the page.
     """
     window, scale = window_of(size)
-    with sync_playwright() as playwright:
+    with scratch_folder("browser") as folder, _driver(folder) as playwright:
         browser = _launched(playwright)
         errors: list[str] = []
         with _browser_failures_raised(errors):
@@ -96,13 +102,31 @@ def _camera(page: Page, errors: Sequence[str], window: tuple[int, int], scale: f
     return take
 
 
+@contextmanager
+def _driver(folder: Path) -> Generator[Playwright, None, None]:
+    """Start Playwright's driver with a folder for what it leaves: the browsers' profiles and downloads.
+
+    It takes the folder from this process's environment alone.
+    """
+    started = sync_playwright()
+    with environment_changed(dict.fromkeys(_TEMPORARY, str(folder))):
+        playwright = started.__enter__()
+    try:
+        yield playwright
+    finally:
+        started.__exit__()
+
+
 def _launched(playwright: Playwright) -> Browser:
-    """Return Playwright's own Chromium, else the system's."""
+    """Return Playwright's own Chromium, else the system's.
+
+    It keeps this process's folder for temporary files: there it makes, and removes, a socket, whose path must be short.
+    """
     found = [None, *dict.fromkeys(path for name in _NAMES if (path := shutil.which(name)))]
     faults: list[str] = []
     for path in found:
         try:
-            return playwright.chromium.launch(executable_path=path, args=_FLAGS)
+            return playwright.chromium.launch(executable_path=path, args=_FLAGS, env={**os.environ})
         except PlaywrightError as e:
             if path is not None or "playwright install" not in str(e):
                 faults.append(f"{path or 'that of Playwright'} does not start: {one_line(e)[:200]}")

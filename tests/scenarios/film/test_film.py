@@ -5,6 +5,7 @@ import math
 import os
 import shutil
 import signal
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -63,12 +64,18 @@ def cursor(picture: Pixels) -> float:
     return left + float(np.argmin(picture[rows, left:].astype(float).mean(axis=0)))
 
 
-def test_a_films_scene_and_cursor_move_with_the_times_of_its_frames(grasp: Path, tmp_path: Path):
+def test_a_films_scene_and_cursor_move_with_the_times_of_its_frames(
+    grasp: Path, tmp_path: Path, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+):
+    temporary = tmp_path_factory.mktemp("temporary")
+    monkeypatch.setenv("TMPDIR", str(temporary))
+    monkeypatch.setattr(tempfile, "tempdir", str(temporary))
     out, plot = tmp_path / "grasp.mp4", "cost of thumb and ring, [Luberto] eq. (4)"
     status, told = film(grasp, "--out", out, "--size", f"{WIDE}x{HIGH}", "--pace", 10, "--fps", 4, "--plot", plot)
     assert status == 0, told
     assert f"\nfilm: {out}, " in told
     assert [p.name for p in tmp_path.iterdir()] == ["grasp.mp4"]
+    assert list(temporary.iterdir()) == []
     time, shown = Record(grasp / "signals.parquet").time, frames(out)
     assert len(shown) == int((time[-1] - time[0]) / 10 * 4) + 2  # the first, each 2.5 s after it, and the last
     assert {p.shape for p in shown} == {(HIGH, WIDE)}
