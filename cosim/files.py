@@ -26,6 +26,25 @@ class FileLocked(OSError):
     """Another running process holds the lock of the file or folder."""
 
 
+class FileTaken(Exception):
+    """There is a file already of the name that a finished one should have."""
+
+
+def give_name(unfinished: Path, path: Path, *, replace: bool = True) -> None:
+    """Give a finished file its name, at once; it lies in the same folder.
+
+    Raises:
+        FileTaken: there is a file of that name, which is not to be replaced. OSError: it cannot have the name.
+    """
+    if replace:
+        os.replace(unfinished, path)
+        return
+    try:
+        _take_name(unfinished, path)
+    except FileExistsError as e:
+        raise FileTaken(f"{path} is there already") from e
+
+
 def lock_file(file: IO[bytes]) -> None:
     """Lock an open file; the lock ends with the process, in whatever way that ends.
 
@@ -189,6 +208,18 @@ def read_csv(path: Path) -> list[tuple[int, list[str]]]:
     except csv.Error as e:
         raise ValueError(f"line {reader.line_num}: {e}") from e
     return rows
+
+
+def _take_name(unfinished: Path, path: Path) -> None:
+    try:
+        os.link(unfinished, path)
+    except FileExistsError:
+        raise
+    except OSError:  # the file system has no links
+        path.open("xb").close()
+        os.replace(unfinished, path)
+    else:
+        unfinished.unlink()
 
 
 def _check_status(path: Path, status: os.stat_result, most: float) -> None:

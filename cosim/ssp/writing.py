@@ -157,7 +157,13 @@ def _texts(port: FmuPort, value: Any) -> list[str]:
 
 
 def write_ssp(
-    system: System, path: Path, name: str, stop: Fraction | None = None, parallel_step: Fraction | None = None
+    system: System,
+    path: Path,
+    name: str,
+    stop: Fraction | None = None,
+    parallel_step: Fraction | None = None,
+    *,
+    replace: bool = True,
 ) -> Path:
     """Write a system with its FMUs and start values as an SSP; it appears complete or not at all.
 
@@ -172,11 +178,13 @@ def write_ssp(
         name: the system's name.
         stop: the stop time of its default experiment, s.
         parallel_step: communication step of all units where they step in parallel, s; each keeps its own without.
+        replace: whether a file of that name is replaced.
 
     Raises:
         WiringError: the system has faults.
         NotExportable: an array that is one variable is connected to one whose entries are variables, clocks are
             connected, an input follows values over time, or an FMU is unpacked.
+        FileTaken: there is a file of that name, which is not to be replaced.
         OSError: the file cannot be written.
     """
     system.check()
@@ -195,7 +203,7 @@ def write_ssp(
     contents |= dict(icons.values())
     drawn = {fmu: member for fmu, (member, _) in icons.items()}
     contents[STRUCTURE] = _Structure(system, version, files, drawn, sets, parallel_step).content(name, stop)
-    return write_archive(path, contents)
+    return write_archive(path, contents, replace=replace)
 
 
 def _file_names(system: System) -> dict[Path, str]:

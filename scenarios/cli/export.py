@@ -12,13 +12,12 @@ from handover.cosim.ssp.writing import bound_enumerations, write_ssp
 from handover.cosim.system.system import System
 from handover.fmus.build import cached
 from handover.fmus.contents.fmi2_description import NoFmi2Form
-from handover.scenarios.cli.options import scenario_options
+from handover.scenarios.cli.options import check_new_file, refused_if_taken, scenario_options
 from handover.scenarios.execution.errors import UsageError, one_line_errors
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.progress import doing, say
 from handover.scenarios.execution.selection import find_scenario, replacements, select_fmus
 from handover.scenarios.execution.unit_values import built_system, split_parameters
-from handover.scenarios.results.run_folder import check_place
 from handover.scenarios.results.tolerated_faults import scenario_code
 
 _HELP = """Write a SCENARIO as an SSP (System Structure and Parameterization), which other tools load.
@@ -48,11 +47,7 @@ def export_command(
         values, of_units = split_parameters(experiment, parameters)
         if file.suffix.lower() != ".ssp":
             raise UsageError(f"--ssp {file}: a name that ends with .ssp is right; other tools know the file by it")
-        if file.is_dir():
-            raise UsageError(f"--ssp {file}: there is a folder of that name")
-        if file.exists() and not force:
-            raise UsageError(f"--ssp {file}: it is there already; --force replaces it")
-        check_place(file.parent)
+        check_new_file(f"--ssp {file}", file, force=force)
         others = replacements(experiment, replaced)
         with doing("building units"):
             fmus = select_fmus(experiment, others, exchangeable)
@@ -63,7 +58,8 @@ def export_command(
         start_from_enumerations(system, {n: unit for n, unit in experiment.units.items() if n not in others})
         warn_of_enumerations(system, others)
         try:
-            write_ssp(system, file, experiment.name, stop, instance.step_in_parallel(values))
+            with refused_if_taken(f"--ssp {file}"):
+                write_ssp(system, file, experiment.name, stop, instance.step_in_parallel(values), replace=force)
         except OSError as e:
             raise UsageError(f"--ssp {file}: it cannot be written: {e.strerror}") from e
         for line in system.notes:

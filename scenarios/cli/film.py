@@ -11,12 +11,12 @@ import click
 from rich.progress import BarColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from handover.scenarios.campaign.folder import OF_NEITHER, CampaignFolder
-from handover.scenarios.cli.options import FiniteRange, trust_option
+from handover.scenarios.cli.options import FiniteRange, check_new_file, refused_if_taken, trust_option
 from handover.scenarios.execution.errors import FilmFailed, UsageError, one_line_errors, require_extra
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.progress import doing, say, terminal_progress
 from handover.scenarios.film import LARGEST, SMALLEST
-from handover.scenarios.results.run_folder import RunFolder, check_place
+from handover.scenarios.results.run_folder import RunFolder
 
 if TYPE_CHECKING:
     from handover.scenarios.film.film import FilmSettings
@@ -107,7 +107,7 @@ def film(
         fps = fps or (_GIF_FPS if path.suffix.lower() == ".gif" else _FPS)
         settings = FilmSettings(size=size, pace=pace, fps=fps, view=view, dark=dark)
         with Interruption():
-            frames = _film(run, path, None if no_plots else plots, settings)
+            frames = _film(run, path, None if no_plots else plots, settings, force=force)
     click.echo(f"film: {path}, {frames} frames, {frames / fps:.1f} s at {fps:g} fps")
 
 
@@ -134,22 +134,18 @@ def _check(path: Path, plots: Sequence[str], fps: float | None, *, force: bool, 
     suffix = path.suffix.lower()
     if suffix not in _SUFFIXES:
         raise UsageError(f"--out {path}: a film's name ends with {', '.join(_SUFFIXES[:-1])} or {_SUFFIXES[-1]}")
-    if path.is_dir():
-        raise UsageError(f"--out {path}: there is a folder of that name")
-    if path.exists() and not force:
-        raise UsageError(f"--out {path}: it is there already; --force replaces it")
     if plots and no_plots:
         raise UsageError("--plot and --no-plots contradict each other")
     if suffix == ".gif" and fps and fps > _FASTEST_GIF:
         raise UsageError(f"--fps {fps:g}: viewers slow down a GIF of more than {_FASTEST_GIF:g} frames per second")
-    check_place(path.parent)
+    check_new_file(f"--out {path}", path, force=force)
 
 
-def _film(run: RunFolder, path: Path, plots: Sequence[str] | None, settings: "FilmSettings") -> int:
+def _film(run: RunFolder, path: Path, plots: Sequence[str] | None, settings: "FilmSettings", *, force: bool) -> int:
     """Write the film; return how many frames it has.
 
     Raises:
-        UsageError: there is no browser, or nothing to be shown.
+        UsageError: there is no browser, nothing to be shown, or a file that is not to be replaced.
         FilmFailed: the browser failed.
     """
     from handover.scenarios.execution.resume import complete_signals
@@ -166,8 +162,8 @@ def _film(run: RunFolder, path: Path, plots: Sequence[str] | None, settings: "Fi
             content = film_content(run, plots, window_of(settings.size)[0][1])
         for line in content.notes:
             say(line)
-        with _progress(sys.stderr) as report:
-            return write_film(content, path, settings, report)
+        with refused_if_taken(f"--out {path}"), _progress(sys.stderr) as report:
+            return write_film(content, path, settings, report, replace=force)
     except (NotFilmed, NoBrowser) as e:
         raise UsageError(str(e)) from e
     except BrowserFailed as e:

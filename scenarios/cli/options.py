@@ -7,7 +7,8 @@ for those that run campaigns. Options of the master are in `handover.scenarios.c
 import math
 import re
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
+from contextlib import contextmanager
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
@@ -15,10 +16,40 @@ from typing import Any
 
 import click
 
+from handover.cosim.files import FileTaken
 from handover.cosim.stepping.options import CALL_LIMIT
 from handover.cosim.typed_data import GREATEST_SEED, is_exact_time
 from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.execution.progress import LOG_LEVELS
+from handover.scenarios.results.run_folder import check_place
+
+_TAKEN = "it is there already; --force replaces it"
+
+
+def check_new_file(option: str, file: Path, *, force: bool) -> None:
+    """Refuse the file of an option, which is to be written, before anything starts.
+
+    Raises:
+        UsageError: there is a folder of that name, or a file and no `force`. InvalidRunFolder: its folder takes none.
+    """
+    if file.is_dir():
+        raise UsageError(f"{option}: there is a folder of that name")
+    if file.exists() and not force:
+        raise UsageError(f"{option}: {_TAKEN}")
+    check_place(file.parent)
+
+
+@contextmanager
+def refused_if_taken(option: str) -> Generator[None, None, None]:
+    """Refuse the file of an option that came to be while it was written, as `check_new_file` does one from before.
+
+    Raises:
+        UsageError: there is one.
+    """
+    try:
+        yield
+    except FileTaken as e:
+        raise UsageError(f"{option}: {_TAKEN}") from e
 
 
 class HeadedOption(click.Option):

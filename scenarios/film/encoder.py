@@ -9,7 +9,7 @@ from pathlib import Path
 from imageio_ffmpeg import get_ffmpeg_exe
 
 from handover.cosim.exceptions import RecordNotWritten, one_line
-from handover.cosim.files import scratch_folder
+from handover.cosim.files import give_name, scratch_folder
 from handover.scenarios.results.run_folder import disk_errors_reported, unfinished_place
 
 CODECS: Mapping[str, Sequence[str]] = {
@@ -30,14 +30,16 @@ Film = Callable[[bytes], object]
 
 
 @contextmanager
-def film_to(path: Path, fps: float) -> Generator[Film, None, None]:
+def film_to(path: Path, fps: float, *, replace: bool) -> Generator[Film, None, None]:
     """Give what takes the frames of a film; it has its name when it is complete, and else it is not there.
 
     Args:
-        path: one that ends with one of the `CODECS`; a file of that name is replaced in the end.
+        path: one that ends with one of the `CODECS`; it has the film in the end.
         fps: frames per second.
+        replace: whether a file of that name is replaced.
 
     Raises:
+        FileTaken: there is a file of that name, which is not to be replaced.
         RecordNotWritten: it cannot be written.
     """
     suffix, unfinished = path.suffix.lower(), unfinished_place(path)
@@ -51,7 +53,7 @@ def film_to(path: Path, fps: float) -> Generator[Film, None, None]:
             if suffix == ".gif":
                 _colour(path, raw, Path(folder) / "colours.png", unfinished)
             with disk_errors_reported(path):
-                unfinished.replace(path)
+                give_name(unfinished, path, replace=replace)
         finally:
             unfinished.unlink(missing_ok=True)
 

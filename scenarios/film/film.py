@@ -55,25 +55,36 @@ def frame_times(begin: float, end: float, settings: FilmSettings) -> Floats:
     return times if steps - whole < 1e-6 * max(steps, 1.0) else np.append(times, end)
 
 
-def write_film(content: FilmContent, path: Path, settings: FilmSettings, report: Callable[[int, int], None]) -> int:
-    """Write a film; return how many frames it has. A file of its name is replaced when the film is complete.
+def write_film(
+    content: FilmContent,
+    path: Path,
+    settings: FilmSettings,
+    report: Callable[[int, int], None],
+    *,
+    replace: bool,
+) -> int:
+    """Write a film; return how many frames it has.
 
     Args:
         content: what it shows.
         path: see `film_to`.
         settings: how it is filmed.
         report: is called with how many frames are done, and of how many.
+        replace: whether a file of its name is replaced, when the film is complete.
 
     Raises:
         NotFilmed: its plots do not fit, its frames are too many, or its scene follows nothing.
         NoBrowser, BrowserFailed: it cannot be drawn.
-        RecordNotWritten: it cannot be written.
+        RecordNotWritten: it cannot be written. FileTaken: there is a file, which is not to be replaced.
     """
     _check_room(content, settings.size)
     times = frame_times(*content.span, settings)
     html = film_html(content, window_of(settings.size)[0], settings.view)
     make_folder_of(path)
-    with open_camera(html, settings.size, dark=settings.dark) as camera, film_to(path, settings.fps) as film:
+    with (
+        open_camera(html, settings.size, dark=settings.dark) as camera,
+        film_to(path, settings.fps, replace=replace) as film,
+    ):
         for k, t in enumerate(times.tolist()):
             report(k, len(times))
             film(camera(min(t, content.span[1])))

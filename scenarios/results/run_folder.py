@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from handover.cosim.exceptions import RecordNotWritten
-from handover.cosim.files import FileLocked, check_regular, folder_locked, holder_of, open_regular
+from handover.cosim.files import FileLocked, check_regular, folder_locked, give_name, holder_of, open_regular
 from handover.cosim.typed_data import InvalidData, read_typed
 from handover.scenarios.results.folder_data import RunData, Summary
 
@@ -272,13 +272,14 @@ def make_folder_of(path: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
 
 
-def write_whole(path: Path, text: str) -> None:
+def write_whole(path: Path, text: str, *, replace: bool = True) -> None:
     """Write a file atomically: it has the old or the new content, whenever the process ends.
 
     Raises:
+        FileTaken: there is a file of that name, which is not to be replaced.
         RecordNotWritten: it cannot be written.
     """
-    with disk_errors_reported(path), replacing(path) as unfinished:
+    with disk_errors_reported(path), replacing(path, replace=replace) as unfinished:
         unfinished.write_text(text, encoding="utf-8")
 
 
@@ -295,10 +296,11 @@ def unfinished_place(path: Path) -> Path:
 
 
 @contextlib.contextmanager
-def replacing(path: Path) -> Generator[Path, None, None]:
+def replacing(path: Path, *, replace: bool = True) -> Generator[Path, None, None]:
     """Give the place of an unfinished file, which takes that of `path` at the end, or goes away on any error.
 
     Raises:
+        FileTaken: there is a file in the end, which is not to be replaced.
         RecordNotWritten: there is something else than a file, such as a device, or it cannot be replaced.
     """
     unfinished = unfinished_place(path)
@@ -307,7 +309,7 @@ def replacing(path: Path) -> Generator[Path, None, None]:
             check_regular(path)
     try:
         yield unfinished
-        os.replace(unfinished, path)
+        give_name(unfinished, path, replace=replace)
     except BaseException:
         with contextlib.suppress(OSError):
             unfinished.unlink(missing_ok=True)

@@ -1,10 +1,11 @@
+import errno
 import os
 import tempfile
 from pathlib import Path
 
 import pytest
 
-from handover.cosim.files import read_csv, read_regular, scratch_folder
+from handover.cosim.files import FileTaken, give_name, read_csv, read_regular, scratch_folder
 
 
 @pytest.mark.skipif(os.name == "nt", reason="needs fork and locks")
@@ -48,3 +49,21 @@ def test_a_table_that_would_take_gigabytes_is_refused(tmp_path: Path, monkeypatc
     (tmp_path / "u.csv").write_text("time,u\n0,1\n1,2\n2,3\n", encoding="utf-8")
     with pytest.raises(ValueError, match="line 4: over"):
         read_csv(tmp_path / "u.csv")
+
+
+@pytest.mark.parametrize("links", [True, False])
+def test_a_finished_file_takes_a_name_that_no_other_has(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, links: bool):
+    def refuse(*_: object) -> None:
+        raise PermissionError(errno.EPERM, "no links here")
+
+    if not links:
+        monkeypatch.setattr(os, "link", refuse)
+    first, second, path = (tmp_path / name for name in ("first", "second", "path"))
+    first.write_text("first")
+    second.write_text("second")
+    give_name(first, path, replace=False)
+    with pytest.raises(FileTaken):
+        give_name(second, path, replace=False)
+    assert {p.name: p.read_text() for p in tmp_path.iterdir()} == {"path": "first", "second": "second"}
+    give_name(second, path)
+    assert {p.name: p.read_text() for p in tmp_path.iterdir()} == {"path": "second"}

@@ -21,6 +21,7 @@ from pathlib import Path, PurePosixPath
 from typing import IO, ClassVar
 
 from handover.cosim.exceptions import InvalidFmu, one_line
+from handover.cosim.files import give_name
 
 STANDARD_METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 """The compressions that the standards allow."""
@@ -447,13 +448,15 @@ _UNIX = 3
 """The system that created the members, so that their permissions count."""
 
 
-def write_archive(path: Path, files: Mapping[str, bytes], programs: Collection[str] = ()) -> Path:
+def write_archive(
+    path: Path, files: Mapping[str, bytes], programs: Collection[str] = (), *, replace: bool = True
+) -> Path:
     """Write a zip file whose bytes depend on the files' names and contents alone.
 
     `programs` are those of the names that may be executed, besides all in `binaries`.
 
     It appears complete or not at all, also where the machine goes down, so two processes may write the same file at the
-    same time.
+    same time. Unless it is to `replace` one of its name, it raises `FileTaken` where there is one in the end.
     """
     content = _packed(files, programs)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -464,7 +467,7 @@ def write_archive(path: Path, files: Mapping[str, bytes], programs: Collection[s
             file.flush()
             os.fsync(file.fileno())
         part.chmod(0o644)
-        os.replace(part, path)
+        give_name(part, path, replace=replace)
     except BaseException:
         part.unlink(missing_ok=True)
         raise

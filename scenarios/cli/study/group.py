@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from handover.cosim.files import FileTaken
 from handover.scenarios.cli.command import DeferredCommand, DeferringGroup
 from handover.scenarios.cli.console import open_console, print_json, print_rows
 from handover.scenarios.execution.errors import UsageError, one_line_errors
@@ -88,7 +89,10 @@ def new(file: Path) -> None:
             raise UsageError(f"{file} is there already; name a new file")
         check_place(file.parent)
         make_folder_of(file)
-        write_whole(file, default_plan())
+        try:
+            write_whole(file, default_plan(), replace=False)
+        except FileTaken as e:
+            raise UsageError(f"{e}; name a new file") from e
     click.echo(file)
     say(f"try: handover study plan {file}")
 

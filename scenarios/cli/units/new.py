@@ -9,12 +9,13 @@ from string import Template
 
 import click
 
+from handover.cosim.files import FileTaken
 from handover.fmus.catalog import UNITS
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.cli.units.place_start import start_for
 from handover.scenarios.execution.errors import UsageError, one_line_errors
 from handover.scenarios.execution.progress import say
-from handover.scenarios.results.run_folder import check_place, disk_errors_reported
+from handover.scenarios.results.run_folder import check_place, make_folder_of, write_whole
 
 _TEMPLATES = Path(__file__).parent / "templates"
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
@@ -52,10 +53,12 @@ def new(kind: str, name: str, out: Path, place: str | None) -> None:
         if there := [file for file in files if (out / file).exists()]:
             raise UsageError(f"{out}: {', '.join(there)} {'is' if len(there) == 1 else 'are'} there already")
         _check_hides_nothing(files)
-        with disk_errors_reported(out):
-            out.mkdir(parents=True, exist_ok=True)
+        try:
             for file, text in files.items():
-                (out / file).write_text(text, encoding="utf-8")
+                make_folder_of(out / file)
+                write_whole(out / file, text, replace=False)
+        except FileTaken as e:
+            raise UsageError(str(e)) from e
     for file in files:
         click.echo(out / file)
     path = f"{module}:{class_name}"

@@ -13,11 +13,13 @@ from support.commands import call, refusal
 from support.cosim.native_units import native_fmu
 from support.rewritten_archive import described_otherwise
 
+from handover.cosim.system.system import System
 from handover.fmus.build import cached
 from handover.fmus.catalog import UNITS, PackageFailure
 from handover.fmus.contents.icons import catalog_icon
 from handover.scenarios.cli.list import place_data, print_place
 from handover.scenarios.execution.errors import UsageError
+from handover.scenarios.execution.unit_values import built_system
 from handover.scenarios.experiment.places import Place
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
 
@@ -112,6 +114,19 @@ def test_an_export_replaces_a_file_only_when_told_to(tmp_path: Path):
     assert file.read_text() == "something"
     assert call("export", "ir_grasp", "--ssp", file, "--force").exit_code == 0
     assert file.stat().st_size > 1000
+
+
+def test_an_export_does_not_replace_a_file_that_comes_to_be_meanwhile(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    file = tmp_path / "grasp.ssp"
+
+    def meanwhile(*arguments: Any) -> System:
+        file.write_text("of another process")
+        return built_system(*arguments)
+
+    monkeypatch.setattr("handover.scenarios.cli.export.built_system", meanwhile)
+    refused = refusal("export", "ir_grasp", "--ssp", file)
+    assert "it is there already; --force replaces it" in refused
+    assert [p.read_text() for p in tmp_path.iterdir()] == ["of another process"]
 
 
 def test_the_page_of_all_units_has_each_with_its_icon_and_ports(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
