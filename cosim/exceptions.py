@@ -7,7 +7,7 @@ suggest the nearest valid name and find in a unit's log the line that gives the 
 import difflib
 import heapq
 import re
-from collections.abc import Collection, Generator, Iterable, Sequence
+from collections.abc import Collection, Generator, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, ClassVar
@@ -29,6 +29,16 @@ _COMPARED, _MANY = 199, 100
 
 _RAISED = re.compile(r'\A[\s\S]*^  File "[^\n]*\n(?:[ \t][^\n]*\n)*(\S[\s\S]*)', re.MULTILINE)
 """A traceback, as far as to what was raised, whose message may have several lines."""
+
+
+MOST_FAULTS = 20
+"""Faults of a list that a message has; for more, valid names are not looked for, either."""
+
+
+def first_faults(faults: Sequence[str]) -> list[str]:
+    """Return the first of a list of faults as a message has them, and how many more there are, as the last."""
+    more = len(faults) - MOST_FAULTS
+    return [*faults[:MOST_FAULTS], f"and {more:,} more"] if more > 0 else list(faults)
 
 
 def did_you_mean(names: Sequence[str]) -> str:
@@ -53,6 +63,12 @@ def suggestion(name: object, valid: Iterable[str]) -> str:
         likeness[n] = matcher.ratio()
     least = max(_LIKE, max(likeness.values(), default=0.0) - _AS_LIKELY)
     return did_you_mean(sorted((n for n, x in likeness.items() if x >= least), key=lambda n: (-likeness[n], n)))
+
+
+def hints(names: Iterable[str], valid: Iterable[str]) -> Iterator[tuple[str, str]]:
+    """Yield names with what `nearest` says of each, as long as their faults are of the first of a list; then ""."""
+    known = list(valid)
+    return ((name, nearest(name, known) if k < MOST_FAULTS else "") for k, name in enumerate(names))
 
 
 def nearest(name: object, valid: Iterable[str]) -> str:
@@ -157,7 +173,7 @@ class InvalidSsp(CosimError):
     """A file is not a valid SSP; `faults` lists everything that is wrong with it, and where."""
 
     def __init__(self, path: Path, faults: Sequence[str]) -> None:
-        super().__init__(f"{path}: {'; '.join(faults)}")
+        super().__init__(f"{path}: {'; '.join(first_faults(faults))}")
         self.path, self.faults = path, tuple(faults)
 
 
@@ -165,7 +181,7 @@ class NotExportable(CosimError):
     """A system cannot be written as an SSP; `faults` lists everything in it that an SSP cannot express."""
 
     def __init__(self, faults: Sequence[str]) -> None:
-        super().__init__(f"it cannot be written as an SSP: {'; '.join(faults)}")
+        super().__init__(f"it cannot be written as an SSP: {'; '.join(first_faults(faults))}")
         self.faults = tuple(faults)
 
 
@@ -181,7 +197,7 @@ class WiringError(CosimError):
     """A system is wired wrongly; `faults` lists everything that is wrong with it."""
 
     def __init__(self, faults: Sequence[str]) -> None:
-        lines = "".join(f"\n  - {f}" for f in faults)
+        lines = "".join(f"\n  - {f}" for f in first_faults(faults))
         super().__init__(f"{len(faults)} fault{'s' if len(faults) > 1 else ''} in the system:{lines}")
         self.faults = tuple(faults)
 
@@ -263,5 +279,5 @@ class InvalidOptions(CosimError, ValueError):
     """Options of a master that are invalid or contradict each other; `faults` lists everything that is wrong."""
 
     def __init__(self, faults: Sequence[str]) -> None:
-        super().__init__("; ".join(faults))
+        super().__init__("; ".join(first_faults(faults)))
         self.faults = tuple(faults)

@@ -17,7 +17,7 @@ from typing import Annotated, Any, TypeVar, cast, get_args
 import msgspec
 from msgspec import Meta, inspect
 
-from handover.cosim.exceptions import nearest, one_line
+from handover.cosim.exceptions import hints, one_line
 from handover.cosim.files import MOST, read_regular
 
 T = TypeVar("T")
@@ -118,9 +118,8 @@ def all_faults(data: Any, declared: Any, where: str = "") -> Iterator[str]:
 
 def unknown_names(table: Mapping[str, Any], known: Mapping[str, Any], where: str) -> Iterator[str]:
     """Yield a fault for each key of a table that is not known."""
-    for name in table:
-        if name not in known:
-            yield f"{where}{'.' if where else ''}{name}: no such key; {nearest(name, known)}"
+    for name, near in hints((n for n in table if n not in known), known):
+        yield f"{where}{'.' if where else ''}{name}: no such key; {near}"
 
 
 def _expected(kind: inspect.Type) -> str:

@@ -18,7 +18,7 @@ from typing import Any
 
 from handover.cosim.blocks.start_values import range_of
 from handover.cosim.blocks.variable import Kind, element_names
-from handover.cosim.exceptions import nearest
+from handover.cosim.exceptions import first_faults, hints
 from handover.cosim.fmu.buffers import Views
 from handover.cosim.fmu.file.default_experiment import exact_seconds
 from handover.cosim.fmu.file.description import FmuPort
@@ -28,7 +28,6 @@ TIME = "time"
 MAX_ENTRIES = 1000
 """Entries of an array that has columns."""
 
-_MAX_FAULTS = 5
 _SHARE_OF_STEP = 0.01
 """By which a rounded time may lie off a step's end, at most."""
 
@@ -40,8 +39,7 @@ class InvalidTable(ValueError):
     """A table is not what it should be; the message lists what is wrong, each with its line or column."""
 
     def __init__(self, name: str, faults: Sequence[str]) -> None:
-        more = [f"and {len(faults) - _MAX_FAULTS} more"] if len(faults) > _MAX_FAULTS else []
-        super().__init__(f"{name}: {'; '.join([*faults[:_MAX_FAULTS], *more])}")
+        super().__init__(f"{name}: {'; '.join(first_faults(faults))}")
         self.name, self.faults = name, tuple(faults)
 
 
@@ -167,8 +165,9 @@ def read_table(content: bytes, name: str, columns: Mapping[str, Column], *, in_r
 
 def unknown_columns(header: Sequence[str], known: Iterable[str], what: str) -> list[str]:
     """Return a fault for each name that is not known; `what` says what the names should be of."""
-    names = list(known)
-    return [f"column {c!r} is no {what} of the FMU: {nearest(c, names)}" for c in header if c not in names]
+    names = dict.fromkeys(known)
+    unknown = (c for c in header if c not in names)
+    return [f"column {c!r} is no {what} of the FMU: {near}" for c, near in hints(unknown, names)]
 
 
 def _rows(content: bytes, name: str) -> tuple[list[str], list[tuple[int, list[str]]]]:

@@ -11,7 +11,7 @@ from types import MappingProxyType
 
 from handover.cosim.blocks.units import UNKNOWN, Unit
 from handover.cosim.blocks.variable import Kind
-from handover.cosim.exceptions import nearest
+from handover.cosim.exceptions import MOST_FAULTS, nearest
 from handover.cosim.fmu.file.description import FmuDescription, FmuPort
 from handover.cosim.ssp.connected_ports import find_entry, ports_of, settable_names, unfed, variable_names
 from handover.cosim.ssp.given_parameters import put
@@ -112,7 +112,10 @@ class _Flattening:
         self._values: dict[Node, SspValue] = {}
         self.flat = FlatSystem(dict(components_of(system)))
         self._paths = set[str]()
+        self._left_out = 0
         self._enter(system, "")
+        if (more := self._left_out - MOST_FAULTS) > 0:
+            _log.warning("and %s more values are left out", f"{more:,}")
         self._values |= {node: value for node, value in asked.items() if node[0] not in descriptions}
         passed_on = {fed.source for fed in self._fed.values()}
         for target in self._fed:
@@ -151,6 +154,9 @@ class _Flattening:
         for binding in element.bindings:
             for name, value in binding.items():
                 if not self._assign(element, path, name, value):
+                    self._left_out += 1
+                    if self._left_out > MOST_FAULTS:
+                        continue
                     near = nearest(name, self._names(element, path))
                     what = f"{path or element.name} has nothing called {name!r} that can be set"
                     _log.warning("%s%s; its value is left out%s", value.where, what, near and f"; {near}")
@@ -284,7 +290,7 @@ def _connector_faults(component: SspComponent, path: str, d: FmuDescription) -> 
         if entry is not None and c.kind in INPUT_KINDS | OUTPUT_KINDS:
             faults += [f"{c.where}{path}.{c.name} {fault}" for fault in _differences(c, entry[0])]
         elif c.kind in ("input", "output", "parameter"):
-            near = nearest(c.name, variable_names(d))
+            near = nearest(c.name, variable_names(d)) if len(faults) < MOST_FAULTS else ""
             faults.append(f"{c.where}the FMU of {path!r} has no variable {c.name!r}; {near}")
     return faults
 

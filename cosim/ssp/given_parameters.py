@@ -13,7 +13,7 @@ import numpy as np
 
 from handover.cosim.blocks.units import UNKNOWN
 from handover.cosim.blocks.variable import Causality, Kind
-from handover.cosim.exceptions import nearest
+from handover.cosim.exceptions import MOST_FAULTS, nearest
 from handover.cosim.fmu.file.description import FmuDescription, FmuPort
 from handover.cosim.ssp.connected_ports import Entry, find_entry, unfed
 from handover.cosim.ssp.parameter_set import SspValue
@@ -109,7 +109,8 @@ def named_parameters(
     for name, text in texts.items():
         parameter = named_parameter(known, descriptions, name)
         if parameter is None:
-            faults.append(f"no parameter {name!r}; {nearest(name, known)}")
+            near = nearest(name, known) if len(faults) < MOST_FAULTS else ""
+            faults.append(f"no parameter {name!r}; {near}")
         elif (array := f"{parameter.path}.{parameter.declared.name}") in texts and array != name:
             faults.append(f"{array} and {name} are both given; give the array, or entries of it")
         else:

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from handover.cosim.blocks.units import UNKNOWN, BaseExponents, Unit
-from handover.cosim.exceptions import nearest
+from handover.cosim.exceptions import MOST_FAULTS, nearest
 from handover.cosim.fmu.file.xml import XmlElement
 from handover.cosim.ssp.xml import SspPart, local, short_name
 from handover.cosim.system.conversion import LinearTransformation
@@ -139,11 +139,13 @@ def mapped_values(
 
     What of one has no counterpart in the other is warned of, as of the element `owner` that the values are for.
     """
-    for source in (name for name in mapping if name not in values):
-        for m in mapping[source]:
-            near = nearest(source, values)
-            text = "%s%s: no parameter is called %r; its mapping to %r is left out%s"
-            _log.warning(text, m.where, owner, source, m.target, near and f"; {near}")
+    unmet = [(source, m) for source, targets in mapping.items() if source not in values for m in targets]
+    for source, m in unmet[:MOST_FAULTS]:
+        near = nearest(source, values)
+        text = "%s%s: no parameter is called %r; its mapping to %r is left out%s"
+        _log.warning(text, m.where, owner, source, m.target, near and f"; {near}")
+    if (more := len(unmet) - MOST_FAULTS) > 0:
+        _log.warning("and %s more mappings are left out", f"{more:,}")
     left_out = [name for name in values if name not in mapping]
     if left_out:
         names = ", ".join(repr(name) for name in left_out[:_MAX_NAMES])

@@ -6,7 +6,7 @@ from typing import Any
 from handover.cosim.blocks.start_values import fault_of
 from handover.cosim.blocks.units import Unit
 from handover.cosim.blocks.variable import Kind
-from handover.cosim.exceptions import nearest
+from handover.cosim.exceptions import hints, nearest
 from handover.cosim.fmu.file.clocks import FmuClock
 from handover.cosim.fmu.file.description import FmuDescription, FmuPort
 from handover.cosim.system.conversion import LinearTransformation, needs_no_conversion
@@ -17,13 +17,10 @@ from handover.cosim.system.time_series import TimeSeries, external_fault
 def value_faults(unit: str, description: FmuDescription, start: Mapping[str, Any]) -> list[str]:
     """Return which start values of a unit it does not have, or cannot take."""
     ports = description.settable
-    faults: list[str] = []
+    unknown = hints((name for name in start if name not in ports), ports)
+    faults = [f"{unit} has no parameter or input {name!r}; {near}" for name, near in unknown]
     for name, value in start.items():
-        if name not in ports:
-            faults.append(f"{unit} has no parameter or input {name!r}; {nearest(name, ports)}")
-            continue
-        fault = fault_of(ports[name], value)
-        if fault:
+        if name in ports and (fault := fault_of(ports[name], value)):
             faults.append(f"{unit}.{name}: {fault}")
     return faults
 

@@ -26,9 +26,6 @@ from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.parameters import InvalidParameter, text_of
 from handover.scenarios.results.tolerated_faults import scenario_code
 
-_MAX_REPORTED = 8
-"""Faults that are reported; there may be one for each point."""
-
 
 @dataclass(frozen=True)
 class PreparedPlan:
@@ -83,8 +80,6 @@ def checked_plan(plan: CampaignPlan) -> CampaignPlan:
             fixed = {name: texts[name] for name in plan.fixed}
         except InvalidParameter as e:
             faults.update(dict.fromkeys(e.faults))
-    if len(faults) > _MAX_REPORTED:
-        faults = {**dict.fromkeys(list(faults)[:_MAX_REPORTED]), f"and {len(faults) - _MAX_REPORTED} faults more": None}
     if faults:
         raise InvalidParameter(tuple(faults))
     return replace(plan, points=points, fixed=fixed)

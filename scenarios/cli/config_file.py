@@ -16,7 +16,7 @@ import click
 import tomli
 from click.core import ParameterSource
 
-from handover.cosim.exceptions import nearest, one_line
+from handover.cosim.exceptions import first_faults, nearest, one_line
 from handover.cosim.files import read_regular, reading_fault
 from handover.cosim.ssp.archive import ssp_root
 from handover.cosim.typed_data import checked, decoded
@@ -164,7 +164,7 @@ def read_config(path: Path, ctx: click.Context) -> ConfigFile:
         except ValueError as e:
             faults.append(one_line(e))
     if faults:
-        raise UsageError(f"{path}: {'; '.join(faults)}")
+        raise UsageError(f"{path}: {'; '.join(first_faults(faults))}")
     return ConfigFile(path, defaults, texts, run)
 
 

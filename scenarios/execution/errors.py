@@ -6,7 +6,7 @@ from contextlib import contextmanager
 
 import click
 
-from handover.cosim.exceptions import CosimError, RecordNotWritten, UnitFailure, WiringError
+from handover.cosim.exceptions import CosimError, RecordNotWritten, UnitFailure, WiringError, first_faults
 from handover.scenarios.execution.exit_status import UNIT_FAILED, USAGE_ERROR
 
 
@@ -75,7 +75,7 @@ def one_line_errors() -> Generator[None, None, None]:
         raise WorkersLost(str(e)) from e
     except WiringError as e:
         number = f"{len(e.faults)} fault{'s' if len(e.faults) > 1 else ''}"
-        raise UsageError(f"{number} in the system: {'; '.join(e.faults)}") from e
+        raise UsageError(f"{number} in the system: {'; '.join(first_faults(e.faults))}") from e
     except (CosimError, InvalidParameter, InvalidRunFolder, ScenarioFailed, WrongType) as e:
         raise UsageError(str(e)) from e
     except (PoolError, NotCompiled, UnknownPlatform, PackageFailure) as e:

@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from handover.cosim.exceptions import WiringError
+from handover.cosim.exceptions import WiringError, first_faults
 from handover.cosim.fmu.file.archive import DESCRIPTION
 from handover.cosim.fmu.file.default_experiment import DefaultExperiment, exact_seconds
 from handover.cosim.fmu.file.description import FmuDescription, FmuPort, describe_fmu
@@ -97,7 +97,7 @@ class FmuRun:
         try:
             system.check()
         except WiringError as e:
-            raise UsageError(f"{self.path}: {'; '.join(naming_step(e.faults))}") from e
+            raise UsageError(f"{self.path}: {'; '.join(first_faults(naming_step(e.faults)))}") from e
         heading = f"{d.name}, an FMU by itself"
         return system_experiment(self.path.name, heading, system, until, settable=FmuParameters(d), alone=True)
 

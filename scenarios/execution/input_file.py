@@ -15,7 +15,7 @@ import numpy as np
 
 from handover.cosim.blocks.start_values import range_of
 from handover.cosim.blocks.variable import Kind, element_names
-from handover.cosim.exceptions import nearest
+from handover.cosim.exceptions import MOST_FAULTS, first_faults, nearest
 from handover.cosim.files import read_csv, reading_fault
 from handover.cosim.fmu.file.description import FmuPort
 from handover.cosim.fmu.start_values import entries_of, parsed_number
@@ -23,7 +23,6 @@ from handover.cosim.system.time_series import TimeSeries
 from handover.scenarios.execution.errors import UsageError
 
 TIME = "time"
-_MAX_FAULTS = 5
 
 Column = tuple[FmuPort, int]
 """An input and which of its entries, counted from 0 in row-major order."""
@@ -98,7 +97,8 @@ def _columns(path: Path, names: Sequence[str], inputs: Mapping[str, FmuPort]) ->
             entries = [name for name, (port, _) in valid.items() if port.name == n]
             faults.append(f"the input {n!r} is an array: columns {entries[0]} to {entries[-1]} are right")
         else:
-            faults.append(f"no input {n!r}; {nearest(n, valid)}")
+            near = nearest(n, valid) if len(faults) < MOST_FAULTS else ""
+            faults.append(f"no input {n!r}; {near}")
     _refuse(path, faults)
     return {n: valid[n] for n in names if n != TIME}
 
@@ -148,5 +148,4 @@ def _series(
 
 def _refuse(path: Path, faults: Sequence[str]) -> None:
     if faults:
-        more = f"; and {len(faults) - _MAX_FAULTS} more" if len(faults) > _MAX_FAULTS else ""
-        raise UsageError(f"{path}: {'; '.join(faults[:_MAX_FAULTS])}{more}")
+        raise UsageError(f"{path}: {'; '.join(first_faults(faults))}")

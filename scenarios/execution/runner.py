@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from handover.cosim.exceptions import InitializationError, UnitFailure, WiringError
+from handover.cosim.exceptions import InitializationError, UnitFailure, WiringError, first_faults
 from handover.cosim.master.checkpoint import Checkpointer, check_states, remove_checkpoint
 from handover.cosim.master.live_control import ControlledPacer, LiveControl
 from handover.cosim.master.master import Master
@@ -106,7 +106,7 @@ def run_task(
     try:
         record_variables(system, task.recorded)
     except WiringError as e:
-        raise UsageError(f"--record: {'; '.join(e.faults)}") from e
+        raise UsageError(f"--record: {'; '.join(first_faults(e.faults))}") from e
     evaluator.note_units(system.units)
     failure: UnitFailure | None = None
     if task.every is not None:

@@ -8,7 +8,7 @@ import numpy as np
 from handover.cosim.blocks.declarations import short_repr
 from handover.cosim.blocks.start_values import fault_of, range_of
 from handover.cosim.blocks.variable import Kind, Variable
-from handover.cosim.exceptions import nearest, suggestion
+from handover.cosim.exceptions import first_faults, nearest, suggestion
 from handover.scenarios.experiment.experiment import Experiment
 
 
@@ -28,7 +28,7 @@ class InvalidParameter(ValueError):
     """Unknown parameters, or values out of their range; `faults` lists them all, `unknown` the names of the former."""
 
     def __init__(self, faults: Sequence[str]) -> None:
-        super().__init__("; ".join(faults))
+        super().__init__("; ".join(first_faults(faults)))
         self.faults = tuple(faults)
         self.unknown = tuple(fault.name for fault in faults if isinstance(fault, UnknownParameter))
 

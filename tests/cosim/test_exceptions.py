@@ -1,10 +1,22 @@
 """Which names an error suggests for an unknown one, and which line of a log it shows."""
 
 import traceback
+from pathlib import Path
 
 import pytest
 
-from handover.cosim.exceptions import last_line, nearest, one_line, suggestion, visible
+from handover.cosim.exceptions import (
+    InvalidOptions,
+    InvalidSsp,
+    NotExportable,
+    WiringError,
+    hints,
+    last_line,
+    nearest,
+    one_line,
+    suggestion,
+    visible,
+)
 
 
 @pytest.mark.parametrize(
@@ -62,3 +74,22 @@ def test_spaces_of_all_kinds_are_shown_as_one_and_long_lines_are_cut():
     assert visible("a\tb\r\u00a0c") == "a b  c"
     assert len(visible("A" * 300_000 + "\nlast")) < 4100
     assert visible("A" * 300_000 + "\nlast").endswith("(296000 characters more)\nlast")
+
+
+def test_a_message_has_the_first_of_very_many_faults_and_an_exception_has_all():
+    faults = [f"fault {k}" for k in range(1, 1021)]
+    for error in (
+        InvalidSsp(Path("a.ssp"), faults),
+        NotExportable(faults),
+        WiringError(faults),
+        InvalidOptions(faults),
+    ):
+        assert str(error).endswith("and 1,000 more")
+        assert "fault 20" in str(error)
+        assert "fault 21" not in str(error)
+        assert list(error.faults) == faults
+    assert str(InvalidOptions(faults[:20])) == "; ".join(faults[:20])
+
+
+def test_valid_names_are_sought_for_the_first_of_very_many():
+    assert [bool(near) for _, near in hints(map(str, range(30)), ["a"])] == 20 * [True] + 10 * [False]

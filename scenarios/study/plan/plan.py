@@ -15,7 +15,7 @@ import msgspec
 import tomli
 from msgspec import Meta, Struct
 
-from handover.cosim.exceptions import nearest, one_line
+from handover.cosim.exceptions import first_faults, nearest, one_line
 from handover.cosim.files import read_regular, reading_fault
 from handover.cosim.typed_data import Name, Text, all_faults, checked, unknown_names
 from handover.scenarios.catalog import SCENARIOS, InvalidScenario, installed_scenarios, named_scenario
@@ -44,7 +44,7 @@ class InvalidPlan(ValueError):
     """A plan that no study can follow; `faults` lists all that is wrong."""
 
     def __init__(self, path: Path | str, faults: Sequence[str]) -> None:
-        super().__init__(f"{path}: {'; '.join(faults)}")
+        super().__init__(f"{path}: {'; '.join(first_faults(faults))}")
         self.path, self.faults = path, tuple(faults)
 
 

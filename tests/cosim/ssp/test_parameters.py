@@ -170,6 +170,13 @@ def test_a_local_variable_with_a_start_value_can_be_given_one_and_a_computed_one
         wording.check(record.getMessage())
 
 
+def test_of_very_many_values_that_are_left_out_the_first_are_named(started: Open, caplog: pytest.LogCaptureFixture):
+    assert started(one("u|Real|1", *(f"x_{k}|Real|1" for k in range(50)))) == {"a": {"u": 1.0}}
+    assert len(caplog.messages) == 21
+    assert "x_19" in caplog.messages[19]
+    assert caplog.messages[20] == "and 30 more values are left out"
+
+
 def bound(inside: str, more: str = "") -> str:
     binding = f"<ssd:ParameterBinding {more}>{inside}</ssd:ParameterBinding>"
     return system(component("a", f"<ssd:ParameterBindings>{binding}</ssd:ParameterBindings>"))

@@ -84,7 +84,8 @@ def test_values_that_do_not_fit_each_other_are_reported_with_their_point():
     ]
     with pytest.raises(InvalidParameter) as caught:
         checked_plan(plan(points=[{"shift_least": f"0.0{n}"} for n in range(51, 75)]))
-    assert (len(caught.value.faults), caught.value.faults[-1]) == (9, "and 16 faults more")
+    assert len(caught.value.faults) == 24
+    assert str(caught.value).endswith("; and 4 more")
 
 
 @pytest.mark.parametrize(("points", "repetitions"), [(0, 1), (1, 0), (1, 10_001), (20, 9000)])

@@ -83,3 +83,13 @@ def test_every_fault_of_a_plan_has_its_line(tmp_path: Path, wording: Wording):
     shown = study("plan", file)
     assert shown.exit_code == 2
     wording.check(shown.output)
+
+
+def test_of_very_many_faults_of_a_plan_the_first_have_a_line_each(tmp_path: Path):
+    file, table = tmp_path / "plan.toml", "[text.en.statements]\n"
+    wrong = "".join(f'wrong_{k} = "x"\n' for k in range(50))
+    file.write_text(default_plan().replace(table, table + wrong), encoding="utf-8")
+    shown = study("plan", file).output.splitlines()
+    assert "50 faults in the plan" in shown[-22]
+    assert shown[-2].startswith("  text.en.statements.wrong_19: no such key; valid: ")
+    assert shown[-1] == "  and 30 more"
