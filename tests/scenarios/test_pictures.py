@@ -24,7 +24,7 @@ def test_every_picture_is_shown_and_made_by_the_command():
     made = {*pictures.FIGURES, *pictures.EXPERIMENTS, pictures.REPORT, pictures.FILM}
     assert set(re.findall(r"\]\([\w./]*?(\w+\.(?:png|jpg|gif))\)", TEXT)) == made
     assert {p.name for p in DOCS.iterdir() if p.suffix in (".png", ".jpg", ".gif")} == made
-    assert "\t$(BIN)/python docs/pictures.py" in (ROOT / "Makefile").read_text(encoding="utf-8")
+    assert " $(BIN)/python docs/pictures.py" in (ROOT / "Makefile").read_text(encoding="utf-8")
 
 
 def centre(file: Path, colour: str) -> Floats:
