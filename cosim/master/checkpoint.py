@@ -329,7 +329,7 @@ class Checkpointer:
             )
 
     def _after(self, t: float) -> float:
-        count = math.floor(Fraction(t) / self._every)
-        while float(count * self._every) <= t:  # t is rounded, so a multiple that is reached may seem to lie after it
-            count += 1
-        return float(count * self._every)
+        after = (math.floor(Fraction(t) / self._every) + 1) * self._every
+        if float(after) <= t:  # t is rounded, so a multiple that is reached may seem to lie after it
+            after = math.ceil(Fraction(math.nextafter(t, math.inf)) / self._every) * self._every
+        return float(after)

@@ -57,17 +57,21 @@ class InvalidHandMessage(ValueError):
 _Joint = Annotated[float, Meta(ge=-_ROUNDING, le=JOINT_MAX + _ROUNDING)]
 
 
+Stamp = Annotated[float, Meta(ge=-1e12, le=1e12)]
+"""A time by a device's clock, s."""
+
+
 @dataclass(frozen=True)
 class _SentSample:
     """A sample as it came, see the table above."""
 
     p_WH: tuple[float, float, float]
     q_WH: tuple[float, float, float, float]
-    stamp: float
+    stamp: Stamp
     closed: bool | None = None
     angles: Annotated[tuple[_Joint, ...], Meta(min_length=JOINTS, max_length=JOINTS)] | None = None
     device: Annotated[str, Meta(max_length=60)] = ""
-    sent: float | None = None
+    sent: Stamp | None = None
 
 
 class HandSample(NamedTuple):

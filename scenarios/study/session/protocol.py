@@ -10,7 +10,7 @@ is written of who does not agree, or may not take part.
 """
 
 import contextlib
-import math
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, cast
@@ -381,6 +381,6 @@ def _settings_of(given: Any) -> dict[str, Any]:
 
 
 def _is_plain(value: Any) -> bool:
-    if isinstance(value, float):
-        return math.isfinite(value)
-    return isinstance(value, (bool, int)) or (isinstance(value, str) and len(value) <= 200)
+    if isinstance(value, (bool, int, float)):
+        return abs(value) <= sys.float_info.max
+    return isinstance(value, str) and len(value) <= 200

@@ -28,6 +28,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from handover.cosim.exceptions import RecordNotWritten
 from handover.cosim.fmu.heartbeat import PolledClock
+from handover.cosim.typed_data import InvalidData, checked
 from handover.scenarios.live.connections import (
     BinaryMessage,
     MessageRate,
@@ -38,7 +39,7 @@ from handover.scenarios.live.connections import (
     send_json,
     too_many,
 )
-from handover.scenarios.live.hand_messages import DeviceClock, InvalidHandMessage
+from handover.scenarios.live.hand_messages import DeviceClock, InvalidHandMessage, Stamp
 from handover.scenarios.results.run_folder import InvalidRunFolder
 from handover.scenarios.study.folder.session_folder import RoundRecord
 from handover.scenarios.study.plan.led_hands import round_parameters
@@ -184,10 +185,11 @@ class StudySeat:
         self._silence.restart()
 
     def _set_clock(self, value: Any) -> None:
-        is_number = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
-        if not is_number:
-            raise InvalidAction("clock takes a finite number of seconds")
-        self._page_offset = self._page_clock.monotonic(float(value), time.monotonic()) - float(value)
+        try:
+            seconds = checked(value, Stamp)
+        except InvalidData as e:
+            raise InvalidAction(f"clock takes a number of seconds: {e}") from e
+        self._page_offset = self._page_clock.monotonic(seconds, time.monotonic()) - seconds
 
     def lead_by_tracker(self, text: str) -> None:
         """Lead the hand by a tracker's message, if a run goes on.

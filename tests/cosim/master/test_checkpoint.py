@@ -56,15 +56,25 @@ def test_a_run_that_was_killed_goes_on_to_the_same_bytes(tmp_path: Path):
     assert sorted(os.listdir(killed)) == sorted(os.listdir(whole))
 
 
-def test_a_checkpoint_is_written_at_the_first_communication_point_that_is_not_before_it(tmp_path: Path):
+@pytest.mark.parametrize(
+    ("every", "wanted"),
+    [
+        (Fraction(1, 2), [2 / 3, 1.0, 5 / 3, 2.0, 8 / 3, 3.0]),
+        (Fraction(1, 10**300), [k / 3 for k in range(1, 10)]),
+    ],
+    ids=["half", "tiny"],
+)
+def test_a_checkpoint_is_written_at_the_first_communication_point_that_is_not_before_it(
+    every: Fraction, wanted: list[float], tmp_path: Path
+):
     s = System()
     s.add("sine", native_fmu("sine"), period=Fraction(1, 3))
     times: list[float] = []
     with Master(s) as master, Recorder(record_of(tmp_path)) as recorder:
-        path, every = checkpoint_of(tmp_path), Fraction(1, 2)
+        path = checkpoint_of(tmp_path)
         write = Checkpointer(path, every, master, recorder, lambda: times.append(master.time) or b"")
         master.run(Fraction(3), [recorder, write])
-    assert times == [2 / 3, 1.0, 5 / 3, 2.0, 8 / 3, 3.0]
+    assert times == wanted
 
 
 def test_a_checkpoint_that_cannot_be_written_is_reported_and_the_run_goes_on(

@@ -27,7 +27,9 @@ def begun(path: Path) -> Protocol:
     protocol.act("language", "en")
     protocol.act("consent", True)
     protocol.act("eligibility", [True] * 3)
-    protocol.act("device", {"device": "mouse", "settings": {"gain": 2.0, "wrong": [1], "nan": float("nan")}})
+    protocol.act(
+        "device", {"device": "mouse", "settings": {"gain": 2.0, "wrong": [1], "nan": float("nan"), "huge": 10**400}}
+    )
     return protocol
 
 

@@ -94,6 +94,7 @@ def test_what_is_no_message_of_the_page_is_refused_with_the_reason(tmp_path: Pat
             '{"act": {"action": "consent", "value": true}}',  # of another screen
             '{"act": {"action": "language", "value": "../.."}}',
             '{"act": {"action": "language", "value": []}}',
+            '{"clock": 1' + "0" * 400 + "}",
             b"\x00\xff",
             " " * 30_000,
             "[" * 5000,
