@@ -20,6 +20,7 @@ import math
 import time
 import traceback
 from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, cast
@@ -60,6 +61,11 @@ _MAX_GAP = 0.25
 """Of the time between two states of a run, how much counts as silence at most, s: else the run or the server stood."""
 _READY = 60.0
 """How long a page may take to draw the scene for the first time, s."""
+
+
+@dataclass(frozen=True)
+class _ClockMessage:
+    clock: Stamp
 
 
 class StudySeat:
@@ -186,7 +192,7 @@ class StudySeat:
 
     def _set_clock(self, value: Any) -> None:
         try:
-            seconds = checked(value, Stamp)
+            seconds = checked({"clock": value}, _ClockMessage).clock
         except InvalidData as e:
             raise InvalidAction(f"clock takes a number of seconds: {e}") from e
         self._page_offset = self._page_clock.monotonic(seconds, time.monotonic()) - seconds
