@@ -41,7 +41,7 @@ def show_inline(translator: Any, node: Any) -> None:
 
 
 def show_block(translator: Any, node: Any) -> None:
-    """Write an equation of its own likewise."""
+    """Write an equation of its own as MathML, in place of Sphinx's visitor."""
     _write(translator, node, "block")
 
 

@@ -1,7 +1,7 @@
 """Makes the pictures of README and site, of this version's runs: `make pictures`. Needs what tests need, and chromium.
 
 Those of published experiments take their whole campaigns, up to an hour; `PYTHONPATH=tests python docs/pictures.py
-NAME...` makes some. Whoever changes what a figure or the report looks like runs it, looks at the pictures, and commits
+NAME...` makes some. After a change of what a figure or the report looks like, run it, look at the pictures, and commit
 them with `pictures.json`, which says what they were made of. `check` finds those that are older than what they show.
 """
 

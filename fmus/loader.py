@@ -189,7 +189,7 @@ class _PrivateModules:
 
     def move_to(self, folder: str) -> None:
         """Take what is not loaded yet, and data, from another folder of the same FMU."""
-        for full, module in list(sys.modules.items()):
+        for full, module in list(sys.modules.items()) if folder != self.folder else ():
             if full.startswith(f"{self.prefix}.") and module.__file__ is not None:
                 module.__file__ = folder + module.__file__[len(self.folder) :]
         self.folder = folder

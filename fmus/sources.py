@@ -121,19 +121,20 @@ def closure(block: str) -> Carried:
             path = _path_in_fmu(part, spec)
             if _is_source(spec) and path not in files:
                 files[path] = Path(spec.origin or "")
-                data |= _data_of(path, files[path])
+                source = files[path].read_bytes()
+                data |= _data_of(path, files[path], source)
                 is_package = spec.submodule_search_locations is not None
                 package = part if is_package else part.rpartition(".")[0]
-                waiting += _imports(files[path].read_bytes(), package, str(files[path]))
+                waiting += _imports(source, package, str(files[path]))
     return Carried(dict(sorted({**files, **data}.items())), tuple(sorted(imported)))
 
 
-def _data_of(path: str, source: Path) -> dict[str, Path]:
+def _data_of(path: str, module: Path, source: bytes) -> dict[str, Path]:
     """Return the data files that a module names beside it, by their paths in the FMU."""
-    named = (source.with_name(name.decode()) for name in _DATA.findall(source.read_bytes()))
+    named = (module.with_name(name.decode()) for name in _DATA.findall(source))
     files = (file for data in named for file in (data.rglob("*") if data.is_dir() else [data]) if file.is_file())
     folder = path.rpartition("/")[0]
-    return {f"{folder}/{file.relative_to(source.parent).as_posix()}".lstrip("/"): file for file in files}
+    return {f"{folder}/{file.relative_to(module.parent).as_posix()}".lstrip("/"): file for file in files}
 
 
 class FileElsewhere(ValueError):
