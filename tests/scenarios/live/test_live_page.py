@@ -162,7 +162,7 @@ def test_pictures_that_come_late_are_coarse_until_there_is_time_and_a_run_that_i
 def test_the_page_shows_what_the_cameras_see_and_the_run_is_the_same(browser: Browser, tmp_path: Path):
     given, cameras = ("-p", "patience=2"), "document.getElementById('cameras')"
     with (
-        live_run(tmp_path / "live", *given, "--pace", "3", scenario="helix_handover") as (address, run),
+        live_run(tmp_path / "live", *given, "--pace", "0.1", scenario="helix_handover") as (address, run),
         shown(browser, address) as page,
     ):
         wait_until(page, f"{cameras}.dataset.pictures > 2")
@@ -172,6 +172,7 @@ def test_the_page_shows_what_the_cameras_see_and_the_run_is_the_same(browser: Br
         captions = page.locator("#cameras figcaption").all_inner_texts()
         assert [caption.partition(",")[0] for caption in captions] == ["camera.left", "camera.right"]
         coded = str(pictures.first.get_attribute("src")).partition("base64,")[2]
+        page.locator("#pace").select_option("0")
         wait_until(page, f"{LIVE}.dataset.ended")
         run.wait()
     seen = cv2.imdecode(np.frombuffer(base64.b64decode(coded), dtype=np.uint8), cv2.IMREAD_COLOR)
