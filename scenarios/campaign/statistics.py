@@ -3,7 +3,7 @@
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from math import comb
 from typing import Any, Literal
 
@@ -147,13 +147,29 @@ def sign_flip_test(differences: Sequence[int]) -> float:
 
     If neither of two ways does better, each difference is as likely to have the other sign. What makes up a difference,
     as several runs of one scene or one participant, may depend on each other as it likes. Where all are -1, 0 or 1,
-    this is McNemar's exact test.
+    this is McNemar's exact test. E. S. Edgington, P. Onghena, Randomization tests.
     """
-    shares: Floats = np.ones(1)  # probabilities of the sums, from the least on
-    for x in (abs(x) for x in differences if x):
-        shares = 0.5 * (np.pad(shares, (0, 2 * x)) + np.pad(shares, (2 * x, 0)))
-    sums = np.arange(len(shares)) - len(shares) // 2
-    return float(shares[np.abs(sums) >= abs(sum(differences))].sum())
+    return _p_of_sum(tuple(sorted(abs(x) for x in differences if x)), abs(sum(differences)))
+
+
+@lru_cache(maxsize=65536)
+def _p_of_sum(sizes: tuple[int, ...], found: int) -> float:
+    """Return how probable a sum of terms of either sign is as far from 0; a study's recur thousands of times."""
+    p = chosen_sums(sizes)
+    sums = 2 * np.arange(len(p)) - (len(p) - 1)
+    return min(1.0, float(p[np.abs(sums) >= found].sum()))
+
+
+@lru_cache(maxsize=4096)
+def chosen_sums(weights: tuple[int, ...]) -> Floats:
+    """Return the probabilities of sums from 0, if each weight is added or not with the same probability."""
+    p: Floats = np.ones(1)
+    for w in weights:
+        longer: Floats = np.zeros(len(p) + w)  # np.pad takes several times as long
+        longer[: len(p)] += p / 2
+        longer[w:] += p / 2
+        p = longer
+    return p
 
 
 def two_proportions(successes: int, n: int, others: int, n_others: int) -> float:

@@ -14,13 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from handover.scenarios.campaign.statistics import holm, success_interval
+from handover.scenarios.campaign.statistics import holm, sign_flip_test, success_interval
 from handover.scenarios.study.folder.session_folder import SessionFolder
 from handover.scenarios.study.folder.study_folder import StudyFolder
 from handover.scenarios.study.statistics.exact_tests import (
     MIN_PARTICIPANTS,
     SignedRankTest,
-    sign_flip_test,
     signed_rank_test,
     within_condition_slopes,
 )

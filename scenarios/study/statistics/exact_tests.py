@@ -1,27 +1,24 @@
 """Exact tests of a study's paired data: pure functions of numbers, which know nothing of plans and folders.
 
-Every null distribution here is that of a sum of independent terms given the data, made by convolution: exact for any
-number of participants, with ties. SciPy's `wilcoxon` is exact with ties only by going through all 2^n signs; the tests
-compare the two where that is possible.
+Every null distribution here is that of `sign_flip_test`, exact for any number of participants, with ties. SciPy's
+`wilcoxon` is exact with ties only by going through all 2^n signs; the tests compare the two where that is possible.
 
 [Wilcoxon1945] Wilcoxon, Individual comparisons by ranking methods.
 [Pratt1959] Pratt, Remarks on zeros and ties in the Wilcoxon signed rank procedures.
 [Hodges1963] Hodges, Lehmann, Estimates of location based on rank tests.
 [Noether1967] Noether, Wilcoxon confidence intervals for location parameters in the discrete case.
 [Streitberg1986] Streitberg, Röhmel, Exact distributions for permutation and rank tests.
-[Edgington2007] Edgington, Onghena, Randomization tests.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import rankdata
 
 from handover.cosim.blocks.ports import Floats
-from handover.scenarios.campaign.statistics import LEVEL
+from handover.scenarios.campaign.statistics import LEVEL, chosen_sums, sign_flip_test
 
 MIN_PARTICIPANTS = 6
 """Fewer cannot reject at 5 % by any test of signs: five that differ alike have p = 2 / 2^5 = 0.0625."""
@@ -80,12 +77,9 @@ def signed_rank_test(differences: Sequence[float]) -> SignedRankTest | None:
 
 def signed_rank_p(d: Floats) -> Floats:
     """Return the p-values of `signed_rank_test` along the last axis, whatever the number of differences."""
-    doubled = np.rint(2.0 * rankdata(np.abs(d), axis=-1)).astype(np.int64)  # mean ranks are halves
-    weights = np.sort(np.where(d != 0.0, doubled, 0), axis=-1)
-    sums = np.where(d > 0.0, doubled, 0).sum(axis=-1)
-    rows = zip(weights.reshape(-1, d.shape[-1]).tolist(), sums.reshape(-1).tolist(), strict=True)
-    p = [_p_of_sum(tuple(w for w in row if w), found) for row, found in rows]
-    return np.array(p).reshape(sums.shape)
+    signed = np.rint(2.0 * rankdata(np.abs(d), axis=-1) * np.sign(d)).astype(np.int64)  # mean ranks are halves
+    p = [sign_flip_test(row) for row in signed.reshape(-1, d.shape[-1]).tolist()]
+    return np.array(p).reshape(d.shape[:-1])
 
 
 def pair_means(d: Floats) -> Floats:
@@ -99,21 +93,10 @@ def shift_interval(d: Floats) -> tuple[float, float]:
 
     [Hodges1963], [Noether1967]
     """
-    below = np.cumsum(_sum_of_chosen(tuple(range(1, len(d) + 1))))
+    below = np.cumsum(chosen_sums(tuple(range(1, len(d) + 1))))
     k = int(np.searchsorted(below, LEVEL / 2, side="right")) - 1  # the largest sum that is too improbable to keep
     means = pair_means(d)
     return float(means[k]), float(means[len(means) - 1 - k])
-
-
-def sign_flip_test(differences: Sequence[int]) -> float:
-    """Return the exact p-value, two-sided, that whole differences are as likely with the other sign.
-
-    Of participants' differences: what a participant does in one round may depend on the others as it likes. Of matched
-    pairs, differences -1, 0 and 1: the behaviours could as well have been the other way round in each pair, and never
-    across pairs, which differ by participant, task and period; that is McNemar's exact test. [Edgington2007]
-    """
-    weights = sorted(abs(x) for x in differences if x)
-    return _two_sided(_sum_of_chosen(tuple(weights)), sum(x for x in differences if x > 0))
 
 
 def within_condition_slopes(x: ArrayLike, y: Sequence[float], condition: Sequence[object]) -> list[float] | None:
@@ -136,28 +119,3 @@ def within_condition_slopes(x: ArrayLike, y: Sequence[float], condition: Sequenc
     if np.linalg.matrix_rank(xs, tol=1e-6) < xs.shape[1]:
         return None
     return [float(slope) for slope in np.linalg.lstsq(xs, ys, rcond=None)[0]]
-
-
-@lru_cache(maxsize=65536)
-def _p_of_sum(weights: tuple[int, ...], found: int) -> float:
-    """Return how probable a sum as far from the mean is; those of differences without ties recur."""
-    return _two_sided(_sum_of_chosen(weights), found)
-
-
-@lru_cache(maxsize=4096)
-def _sum_of_chosen(weights: tuple[int, ...]) -> Floats:
-    """Return the probabilities of sums from 0, if each weight is added or not with the same probability."""
-    p: Floats = np.ones(1)
-    for w in weights:
-        longer: Floats = np.zeros(len(p) + w)
-        longer[: len(p)] += p / 2
-        longer[w:] += p / 2
-        p = longer
-    return p
-
-
-def _two_sided(probabilities: Floats, found: int) -> float:
-    """Return how probable it is to be as far from the mean as what was found, either way."""
-    sums = np.arange(len(probabilities))
-    far = np.abs(sums - sums @ probabilities)
-    return min(1.0, float(probabilities[far >= far[found] - 1e-9].sum()))

@@ -156,3 +156,5 @@ def test_signs_flipped_are_counted_as_by_brute_force():
         p = np.mean([total >= abs(sum(differences)) for total in flipped])
         assert sign_flip_test(differences) == pytest.approx(p, abs=1e-12)
     assert sign_flip_test([]) == 1.0
+    only_first, only_second = [True] * 7 + [False] * 2, [False] * 7 + [True] * 2
+    assert sign_flip_test([1] * 7 + [0] + [-1] * 2) == pytest.approx(paired_test(only_first, only_second).p)

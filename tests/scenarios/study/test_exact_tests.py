@@ -9,11 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from handover.cosim.blocks.ports import Floats
 from handover.scenarios.study.statistics.exact_tests import (
     pair_means,
     shift_interval,
-    sign_flip_test,
     signed_rank_test,
     within_condition_slopes,
 )
@@ -87,23 +85,6 @@ def test_the_interval_has_the_shifts_that_the_test_does_not_reject(d: list[float
 def test_the_closed_interval_covers_with_ties():
     d = np.random.default_rng(10).integers(-2, 3, size=(2000, 10)) / 2 + 0.5  # symmetric about 0.5, with many ties
     assert np.mean([low <= 0.5 <= high for low, high in map(shift_interval, d)]) >= 0.95
-
-
-def by_all_flips(pairs: Sequence[tuple[int, int]]) -> float:
-    """Return the p-value by giving the rounds of each pair the behaviours both ways round."""
-    ways: Floats = np.array([sum(way) for way in itertools.product(*((a - b, b - a) for a, b in pairs))], dtype=float)
-    return float(np.mean(np.abs(ways) >= abs(sum(a - b for a, b in pairs))))
-
-
-@pytest.mark.parametrize(("highest", "seed"), [(1, 0), (1, 1), (3, 2)])
-def test_flips_within_matched_pairs_agree_with_all_flips_and_with_mcnemars_test(highest: int, seed: int):
-    drawn = np.random.default_rng(seed).binomial(highest, (0.2, 0.7), size=(11, 2))
-    pairs = [(int(a), int(b)) for a, b in drawn]
-    found = sign_flip_test([a - b for a, b in pairs])
-    assert found == pytest.approx(by_all_flips(pairs))
-    discordant = [a > b for a, b in pairs if a != b]
-    if highest == 1:
-        assert found == pytest.approx(stats.binomtest(sum(discordant), len(discordant)).pvalue)
 
 
 def test_slopes_are_those_of_least_squares_with_means_of_conditions():
