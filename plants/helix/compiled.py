@@ -58,8 +58,10 @@ def _compile(function: Callable[P, T], **options: bool) -> Callable[P, T]:
     if _numba is None:
         return function
     sys.modules.setdefault(_MODULE, types.ModuleType(_MODULE))
-    function.__module__ = _MODULE
-    return cast("Callable[P, T]", _numba.njit(error_model="numpy", nogil=True, **options)(function))
+    own: Any = function
+    kernel = types.FunctionType(own.__code__, own.__globals__, own.__name__)  # its own may be called by Python, too
+    kernel.__module__ = _MODULE
+    return cast("Callable[P, T]", _numba.njit(error_model="numpy", nogil=True, **options)(kernel))
 
 
 def compiled_once(*sources: str) -> Callable[[Callable[P, T]], Callable[P, T]]:
@@ -76,13 +78,13 @@ def compiled_once(*sources: str) -> Callable[[Callable[P, T]], Callable[P, T]]:
         made = _compile(function)
         if _numba is not None:
             with contextlib.suppress(ImportError, AttributeError, OSError, RuntimeError):
-                _keep(made, function, sources)
+                _keep(made, sources)
         return made
 
     return decorate
 
 
-def _keep(dispatcher: Any, function: Any, sources: tuple[str, ...]) -> None:
+def _keep(dispatcher: Any, sources: tuple[str, ...]) -> None:
     """Give a compiled function a cache by content; Numba has no public way to say where it lies."""
     caching = importlib.import_module("numba.core.caching")
     digest = hashlib.sha256()
@@ -112,4 +114,4 @@ def _keep(dispatcher: Any, function: Any, sources: tuple[str, ...]) -> None:
     class ContentCache(caching.FunctionCache):
         _impl_class = Implementation
 
-    dispatcher._cache = ContentCache(function)
+    dispatcher._cache = ContentCache(dispatcher.py_func)

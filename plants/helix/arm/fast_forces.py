@@ -15,13 +15,13 @@ from handover.cosim.blocks.ports import Floats
 from handover.plants.helix.compiled import compiled
 from handover.plants.helix.se3 import (
     add,
-    conjugate,
     cross,
-    dot,
     half,
     logarithm,
-    product,
+    norm,
     quaternion,
+    quaternion_inverse,
+    quaternion_multiply,
     rotate,
     scale,
     subtract,
@@ -87,12 +87,12 @@ def beam_strain(p: Floats, q: Floats, e: int, rates: Floats) -> tuple[float, flo
         rates: filled with the relative twist in M by the rates of the two nodes, (6, 12).
     """
     q_B0, q_B1 = quaternion(q, e), quaternion(q, e + 1)
-    q_01 = product(conjugate(q_B0), q_B1)
+    q_01 = quaternion_multiply(quaternion_inverse(q_B0), q_B1)
     q_M1 = half(q_01)
-    q_BM = product(q_B0, q_M1)
-    q_MB, q_M0 = conjugate(q_BM), conjugate(q_M1)
+    q_BM = quaternion_multiply(q_B0, q_M1)
+    q_MB, q_M0 = quaternion_inverse(q_BM), quaternion_inverse(q_M1)
     chord = subtract(vector(p, e + 1), vector(p, e))
-    u, theta = logarithm(q_01, rotate(conjugate(q_B0), chord))
+    u, theta = logarithm(q_01, rotate(quaternion_inverse(q_B0), chord))
     arm = scale(0.5, u)
     for c in range(3):
         axis = (1.0 if c == 0 else 0.0, 1.0 if c == 1 else 0.0, 1.0 if c == 2 else 0.0)
@@ -158,13 +158,13 @@ def measure_tendons(chain: Chain, p: Floats, q: Floats, spans: Floats, length: F
                 if b < last:
                     there = add(vector(p, b + 1), rotate(quaternion(q, b + 1), hole))
                     span = subtract(there, here)
-                    distance = math.sqrt(dot(span, span))
+                    distance = norm(span)
                     spans[b, k] = distance
                     length[tendon] += distance
                     after = scale(1.0 / distance, span)
                     here = there
                 pull = subtract(before, after)
-                turn = cross(hole, rotate(conjugate(quaternion(q, b)), pull))
+                turn = cross(hole, rotate(quaternion_inverse(quaternion(q, b)), pull))
                 for c in range(3):
                     G[6 * b + c, tendon] = pull[c]
                     G[6 * b + 3 + c, tendon] = turn[c]
@@ -220,13 +220,13 @@ def add_loads(
         bent = add(cross(w_t, centre), cross(w, cross(w, centre)))
         force = scale(m, add(a, rotate(q_B, bent)))
         spin = cross(w, (across * w[0], across * w[1], along * w[2]))
-        lever = scale(m, cross(centre, rotate(conjugate(q_B), a)))
+        lever = scale(m, cross(centre, rotate(quaternion_inverse(q_B), a)))
         moment = add(add((across * w_t[0], across * w_t[1], along * w_t[2]), spin), lever)
         for c in range(3):
             r[i + c] += force[c]
             r[i + 3 + c] += moment[c]
     i, q_B = 6 * (n - 1), quaternion(q, n - 1)
-    pull = cross((0.0, 0.0, chain.gripper), rotate(conjugate(q_B), (f_G[0], f_G[1], f_G[2])))
+    pull = cross((0.0, 0.0, chain.gripper), rotate(quaternion_inverse(q_B), (f_G[0], f_G[1], f_G[2])))
     for c in range(3):
         r[i + c] -= f_G[c]
         r[i + 3 + c] -= pull[c]
@@ -249,7 +249,7 @@ def accelerate(chain: Chain, q: Floats, r: Floats, v_t: Floats) -> None:
         m, across, along, z = chain.nodes[b, 0], chain.nodes[b, 1], chain.nodes[b, 2], chain.nodes[b, 3]
         i, q_B, centre = 6 * b, quaternion(q, b), (0.0, 0.0, z)
         F = (-r[i], -r[i + 1], -r[i + 2])
-        M = subtract((-r[i + 3], -r[i + 4], -r[i + 5]), cross(centre, rotate(conjugate(q_B), F)))
+        M = subtract((-r[i + 3], -r[i + 4], -r[i + 5]), cross(centre, rotate(quaternion_inverse(q_B), F)))
         across -= m * z * z
         w_t = (M[0] / across, M[1] / across, M[2] / along)
         a = subtract(scale(1.0 / m, F), rotate(q_B, cross(w_t, centre)))

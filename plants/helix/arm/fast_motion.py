@@ -25,7 +25,7 @@ from handover.plants.helix.arm.fast_forces import (
 )
 from handover.plants.helix.arm.fast_matrix import Directions, Factors, factorize, solve
 from handover.plants.helix.compiled import compiled, compiled_once
-from handover.plants.helix.se3 import exponential, normalised, product, quaternion
+from handover.plants.helix.se3 import from_rotation_vector, normalize, quaternion, quaternion_multiply
 
 _RADIUS = 0.9  # spectral radius at infinite frequency, as of TendonArm's solver
 _ALPHA_M = (2.0 * _RADIUS - 1.0) / (_RADIUS + 1.0)
@@ -133,7 +133,7 @@ def _move(x: Motion, h: float, w: Memory) -> None:
             h * v[i + 1] + h * h * ((0.5 - _BETA) * a[i + 1] + _BETA * a_end[i + 1]),
             h * v[i + 2] + h * h * ((0.5 - _BETA) * a[i + 2] + _BETA * a_end[i + 2]),
         )
-        q = normalised(product(quaternion(x.q, b), exponential(turn)))
+        q = normalize(quaternion_multiply(quaternion(x.q, b), from_rotation_vector(turn)))
         for c in range(4):
             end.q[b, c] = q[c]
     for t in range(9):
@@ -187,7 +187,7 @@ def _step(chain: Chain, x: Motion, command: Floats, f_G: Floats, h: float, w: Me
     return False
 
 
-@compiled_once(__name__, fast_forces.__name__, fast_matrix.__name__, se3.__name__)
+@compiled_once(__name__, fast_forces.__name__, fast_matrix.__name__, *se3.SOURCES)
 def advance(
     nodes: Floats,
     beams: Floats,

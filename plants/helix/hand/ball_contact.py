@@ -27,7 +27,7 @@ from typing import NamedTuple
 from handover.cosim.blocks.ports import Floats
 from handover.plants.helix import se3
 from handover.plants.helix.compiled import compiled, compiled_inline, compiled_once
-from handover.plants.helix.se3 import Vector, add, cross, dot, scale, subtract, vector
+from handover.plants.helix.se3 import Vector, add, cross, dot, norm, scale, subtract, vector
 
 CAPSULES = 7
 """Bodies of the gripper: two links of each of three fingers, the second of which has the tip, then the palm."""
@@ -92,7 +92,7 @@ def _touch(
     xi = add(subtract(xi, scale(dot(xi, n), n)), scale(h, v_t))
     damping = 0.5 * math.sqrt(k * c.ball_mass)
     f_t = add(scale(-k, xi), scale(-damping, v_t))
-    size, most = math.sqrt(dot(f_t, f_t)), mu * f_n
+    size, most = norm(f_t), mu * f_n
     if size > most:
         f_t = scale(most / size, f_t)
         xi = scale(-1.0 / k, f_t)
@@ -106,7 +106,7 @@ def _roll(most: float, c: ContactNumbers, w: Vector, theta: Vector, h: float) ->
     theta = add(theta, scale(h, w))
     damping = 0.5 * c.ball_radius * math.sqrt(k * c.ball_mass)
     moment = add(scale(-k, theta), scale(-damping, w))
-    size = math.sqrt(dot(moment, moment))
+    size = norm(moment)
     if size > most:
         moment = scale(most / size, moment)
         theta = scale(-1.0 / k, moment)
@@ -127,7 +127,7 @@ def _nearest(p: Vector, a: Vector, b: Vector) -> float:
 def _depth_in_hand(p: Vector, radius: float, bottom: Vector, c: ContactNumbers) -> tuple[float, Vector]:
     """Return how deep a sphere is in the hand's surface, whose cup's lowest point is given, and the normal."""
     to_middle = subtract(add(bottom, (0.0, 0.0, c.cup_radius)), p)
-    distance = math.sqrt(dot(to_middle, to_middle))
+    distance = norm(to_middle)
     if distance > 0.0 and to_middle[2] >= c.cup_cosine * distance:
         depth = distance + radius - c.cup_radius
         return (depth if depth < radius + _DEEPEST else -1.0), scale(1.0 / distance, to_middle)
@@ -155,7 +155,7 @@ def _gripper_contacts(
         a, b = vector(ends[i], 0), vector(ends[i], 1)
         s = _nearest(p, a, b)
         away = subtract(p, add(scale(1.0 - s, a), scale(s, b)))
-        distance = math.sqrt(dot(away, away))
+        distance = norm(away)
         depth = c.ball_radius + radii[i] - distance
         if depth > 0.0 and distance > 0.0:
             n = scale(1.0 / distance, away)
@@ -242,7 +242,7 @@ def _integrate(
         arm[0, i] += h * arm[1, i]
 
 
-@compiled_once(__name__, se3.__name__)
+@compiled_once(__name__, *se3.SOURCES)
 def advance(
     numbers: tuple[float, ...],
     ball: Floats,
