@@ -50,12 +50,17 @@ hosts: $(VENV)/.installed-test
 paper: $(VENV)/.installed-test
 	$(BIN)/python -m pytest -m paper
 
-lint: $(VENV)/.installed-test
+lint: $(VENV)/.installed-test build/lint/handover
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/lint-imports --no-cache
+	cd build/lint && $(CURDIR)/$(BIN)/lint-imports --no-cache --config $(CURDIR)/pyproject.toml
 	$(TYPES)
 	$(TYPES) --python-version 3.10 $(OLDEST)
+
+# The package as it is installed, for tools that read modules without importing them.
+build/lint/handover:
+	mkdir -p $@
+	ln -s $(addprefix ../../../,cosim plants controllers fmus scenarios handover/__init__.py handover/py.typed) $@
 
 bench: $(VENV)/.installed-test
 	$(BIN)/python -m pytest tests/benchmarks -m "bench and not real_time" --benchmark-enable -s

@@ -14,12 +14,19 @@ import shutil
 import sys
 from pathlib import Path
 
-from setuptools import Distribution, setup
+from setuptools import Distribution, find_packages, setup
 from setuptools.command.bdist_wheel import bdist_wheel
 from setuptools.command.build_py import build_py
 from setuptools.errors import CompileError, OptionError
 
-sys.path.insert(0, str(Path(__file__).parent))  # a build frontend leaves it out
+ROOT = Path(__file__).parent
+PARTS = ("cosim", "plants", "controllers", "fmus", "scenarios")
+"""Folders beside `handover/` that are its subpackages; none is a package of its own."""
+
+sys.path.insert(0, str(ROOT))  # a build frontend leaves it out
+import handover
+
+handover.__path__.append(str(ROOT))  # what is not installed yet
 
 from handover.cosim.isolation.compile import compile_isolation
 from handover.cosim.native_libraries import TARGETS, CompilationError, host_platform
@@ -55,6 +62,14 @@ def _platform_tag(default: str) -> str:
         "darwin": f"macosx_{version}_{architecture.replace('aarch64', 'arm64')}",
         "windows": f"win_{architecture.replace('x86_64', 'amd64')}",
     }[system]
+
+
+def _packages() -> list[str]:
+    return ["handover", *(f"handover.{name}" for part in PARTS for name in (part, *_below(part)))]
+
+
+def _below(part: str) -> list[str]:
+    return [f"{part}.{name}" for name in find_packages(str(ROOT / part))]
 
 
 def _site() -> str:
@@ -115,6 +130,8 @@ class WithLibraries(Distribution):
 setup(
     cmdclass={"build_py": BuildWithLibraries, "bdist_wheel": PlatformWheel},
     distclass=WithLibraries,
+    packages=_packages(),
+    package_dir={"handover": "handover", **{f"handover.{part}": part for part in PARTS}},
     long_description=_readme(),
     long_description_content_type="text/markdown",
     project_urls=_links(),

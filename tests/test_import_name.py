@@ -45,11 +45,3 @@ def test_a_repository_with_folders_of_the_same_names_keeps_them(repository: Path
     scenarios, units = map(int, done.stdout.split())
     assert scenarios >= 9
     assert units >= 17
-
-
-def test_the_package_holds_what_the_five_folders_hold():
-    import handover
-
-    package = Path(handover.__file__ or "").parent
-    for folder in FOLDERS:
-        assert (package / folder / "__init__.py").is_file(), folder

@@ -3,7 +3,6 @@
 import ast
 import dataclasses
 import importlib
-import importlib.util
 import json
 import re
 import shutil
@@ -215,7 +214,6 @@ kernelspec:
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(importlib.util.find_spec("myst_nb") is None, reason="the extra docs is not installed")
 @pytest.mark.parametrize(
     ("text", "code", "named"),
     [

@@ -1,6 +1,11 @@
-"""The wheels for all platforms: what they are called, what they are for, and what an index shows of them."""
+"""The wheels for all platforms: what they are called, what they are for, what an index shows of them; the sdist."""
 
+import os
 import re
+import shutil
+import subprocess
+import sys
+import tarfile
 import zipfile
 from email import message_from_bytes
 from email.message import Message
@@ -26,6 +31,7 @@ LIBRARIES = (
     "fmus/runtime/bin/{}/fmi2",
     "fmus/runtime/bin/{}/fmi3",
 )
+PARTS = ("controllers", "cosim", "fmus", "plants", "scenarios")
 SITE = "https://example.org/files"
 
 
@@ -48,6 +54,8 @@ def test_a_wheel_has_the_libraries_of_its_platform_alone_and_shows_pictures_by_t
     with zipfile.ZipFile(made) as archive:
         assert [n for n in sorted(archive.namelist()) if n.endswith((".so", ".dll", ".dylib"))] == expected
         assert {n.split("/bin/")[1].split("/")[0] for n in archive.namelist() if "/bin/" in n} == {platform}
+        modules = {f"handover/{p.relative_to(checkout)}" for part in PARTS for p in (checkout / part).rglob("*.py")}
+        assert {n for n in archive.namelist() if n.endswith(".py")} == {"handover/__init__.py", *modules}
         for name in expected:
             found = facts(archive.read(name))
             assert found.platform == platform
@@ -59,6 +67,24 @@ def test_a_wheel_has_the_libraries_of_its_platform_alone_and_shows_pictures_by_t
     pictures = re.findall(rf"\({SITE}/([^)]*)\)", text)
     assert len(pictures) > 5
     assert [file for file in pictures if not (ROOT / file.partition("#")[0]).exists()] == []
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not (ROOT / ".git").exists(), reason="only a clone knows which files are the project's")
+def test_an_sdist_is_the_repository(checkout: Path, tmp_path: Path):
+    listed = subprocess.check_output(["git", "ls-files", "-z"], cwd=ROOT, text=True).split("\0")
+    files = {name for name in listed if (ROOT / name).is_file()}
+    for name in files:
+        (tmp_path / "clone" / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy2(ROOT / name, tmp_path / "clone" / name)
+    build = [sys.executable, "-c", "import setuptools.build_meta as b; b.build_sdist('..')"]
+    environment = {**os.environ, "PYTHONPATH": str(checkout / "build-tools")}
+    subprocess.run(build, cwd=tmp_path / "clone", env=environment, stdout=subprocess.DEVNULL, check=True)
+    (made,) = tmp_path.glob("*.tar.gz")
+    with tarfile.open(made) as archive:
+        packed = {member.name.partition("/")[2] for member in archive if member.isfile()}
+    of_setuptools = {name for name in packed if name in ("PKG-INFO", "setup.cfg") or ".egg-info/" in name}
+    assert packed - of_setuptools == files
 
 
 @pytest.mark.platforms

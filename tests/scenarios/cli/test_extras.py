@@ -49,7 +49,7 @@ for call in json.loads(sys.argv[1]):
 
 def python(base: Path, folder: Path, program: str, *arguments: str) -> str:
     """Run a program in a folder on the base installation, and return what it prints."""
-    begin = f"import sys; sys.path += {[str(ROOT), str(base)]}\n"
+    begin = f"import sys; sys.path += {[str(ROOT), str(base)]}\nimport handover; handover.__path__ += {[str(ROOT)]}\n"
     done = subprocess.run(
         [sys.executable, "-S", "-c", f"{begin}{program}", *arguments],
         cwd=folder,
