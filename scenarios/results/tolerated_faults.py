@@ -4,6 +4,7 @@ A unit may give outputs of which nobody thought: all zero, constant, NaN. What i
 figures, replay, pictures) may then raise anything. The run, its record and the rest of its report are kept.
 """
 
+import os
 import traceback
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
@@ -37,8 +38,14 @@ def fault_line(e: BaseException) -> str:
     return f"{name}{place}" if message == name else f"{name}: {message}{place}"
 
 
+_OURS = tuple(
+    f"{Path(__file__).parents[2] / part}{os.sep}" for part in ("controllers", "cosim", "fmus", "plants", "scenarios")
+)
+"""Folders of this package."""
+
+
 def _is_ours(frame: traceback.FrameSummary) -> bool:
-    return f"{__name__.partition('.')[0]}/" in frame.filename.replace("\\", "/")
+    return frame.filename.startswith(_OURS)
 
 
 def _is_users(frame: traceback.FrameSummary) -> bool:
