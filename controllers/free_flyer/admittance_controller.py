@@ -10,8 +10,7 @@ import numpy as np
 from handover.controllers.free_flyer import impedance_controller, ports
 from handover.controllers.free_flyer.body import InvalidControllerParameters, stability_faults
 from handover.controllers.free_flyer.gains import PidGains
-from handover.controllers.free_flyer.ports import PERIOD, TERMINALS, Behaviour, Inputs
-from handover.controllers.free_flyer.rotations import from_rotation_vector, rotation_matrix, unit_quaternion
+from handover.controllers.free_flyer.ports import PERIOD, TERMINALS, Behaviour, Inputs, unit_quaternion
 from handover.controllers.free_flyer.sampled_loop import LinearController, SampledLoop
 from handover.controllers.free_flyer.virtual_body import VirtualBody, admittance_law
 from handover.controllers.free_flyer.wrench_observer import ThrustModel, WrenchObserver
@@ -22,12 +21,14 @@ from handover.cosim.blocks.plain_rotation import (
     Vector,
     add,
     cross,
+    from_rotation_vector,
     inverse_rotate,
     multiply,
     norm,
     quaternion_multiply,
     relative_quaternion,
     rotate,
+    rotation_matrix,
     rotation_vector,
     row_major,
     scale,

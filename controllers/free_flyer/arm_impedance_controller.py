@@ -11,10 +11,9 @@ from handover.controllers.free_flyer.arm_impedance import ArmAtRest, NullMotion
 from handover.controllers.free_flyer.arm_model import ArmModel, Chain, OperationalSpace, mass_matrix
 from handover.controllers.free_flyer.body import InvalidControllerParameters, stability_faults
 from handover.controllers.free_flyer.gains import ImpedanceGains, published_gains
-from handover.controllers.free_flyer.ports import ARM, INERTIA, MASS, PERIOD, TERMINALS, Behaviour
+from handover.controllers.free_flyer.ports import ARM, INERTIA, MASS, PERIOD, TERMINALS, Behaviour, unit_quaternion
 from handover.controllers.free_flyer.ports import Inputs as BaseInputs
 from handover.controllers.free_flyer.ports import Outputs as BaseOutputs
-from handover.controllers.free_flyer.rotations import unit_quaternion
 from handover.controllers.free_flyer.sampled_loop import SampledLoop
 from handover.cosim.blocks.geometry import quaternion_of, rotation_of
 from handover.cosim.blocks.plain_rotation import quaternion, rotation_vector

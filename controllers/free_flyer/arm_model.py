@@ -10,6 +10,7 @@ import numpy as np
 
 from handover.controllers.free_flyer.body import FlyerBody
 from handover.cosim.blocks.geometry import rotation_by, skew
+from handover.cosim.blocks.plain_rotation import cross, vector
 from handover.cosim.blocks.ports import Floats
 
 
@@ -196,6 +197,4 @@ def operational_bias(J: Floats, J_rate: Floats, B: Floats, C: Floats, xi_dot: Fl
 
 
 def _cross(a: Floats, b: Floats) -> Floats:
-    a_x, a_y, a_z = a.tolist()
-    b_x, b_y, b_z = b.tolist()
-    return np.array([a_y * b_z - a_z * b_y, a_z * b_x - a_x * b_z, a_x * b_y - a_y * b_x])
+    return np.array(cross(vector(a), vector(b)))

@@ -5,10 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handover.controllers.free_flyer.ports import ARM, Behaviour
-from handover.controllers.free_flyer.rotations import rotation_matrix, unit_quaternion
+from handover.controllers.free_flyer.ports import ARM, Behaviour, unit_quaternion
 from handover.cosim.blocks.block import InvalidParameters
-from handover.cosim.blocks.plain_rotation import rotate, vector
+from handover.cosim.blocks.plain_rotation import rotate, rotation_matrix, vector
 from handover.cosim.blocks.ports import Floats, Vector3, Vector4, parameter
 from handover.cosim.blocks.units import Metre, MetrePerSecond, MetrePerSecond2, Number, Radian, Second
 

@@ -15,8 +15,7 @@ from handover.controllers.free_flyer.handover_parameters import (
     Params,
 )
 from handover.controllers.free_flyer.handover_ports import HandoverPhase, Inputs, Outputs
-from handover.controllers.free_flyer.ports import PERIOD
-from handover.controllers.free_flyer.rotations import rotation_matrix, unit_quaternion
+from handover.controllers.free_flyer.ports import PERIOD, unit_quaternion
 from handover.controllers.free_flyer.velocity_monitor import PullMonitor, VelocityMonitor
 from handover.cosim.blocks.plain_rotation import (
     Quaternion,
@@ -26,6 +25,7 @@ from handover.cosim.blocks.plain_rotation import (
     cross,
     distance,
     rotate,
+    rotation_matrix,
     vector,
 )
 from handover.cosim.blocks.state import pack_state, unpack_state

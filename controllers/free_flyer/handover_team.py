@@ -17,11 +17,21 @@ from handover.controllers.free_flyer.handover_state_machine import (
 )
 from handover.controllers.free_flyer.handover_state_machine import Inputs as RobotInputs
 from handover.controllers.free_flyer.handover_state_machine import Outputs as RobotOutputs
-from handover.controllers.free_flyer.ports import PERIOD
-from handover.controllers.free_flyer.rotations import rotation_matrix, unit_quaternion
+from handover.controllers.free_flyer.ports import PERIOD, unit_quaternion
 from handover.controllers.free_flyer.velocity_monitor import VelocityMonitor
 from handover.cosim.blocks.block import InvalidParameters
-from handover.cosim.blocks.plain_rotation import ZERO, Vector, add, dot, lerp, nlerp, rotate, subtract, vector
+from handover.cosim.blocks.plain_rotation import (
+    ZERO,
+    Vector,
+    add,
+    dot,
+    lerp,
+    nlerp,
+    rotate,
+    rotation_matrix,
+    subtract,
+    vector,
+)
 from handover.cosim.blocks.ports import Vector3, Vector4, output, parameter, port
 from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.terminals import Terminal, TerminalKind, terminal

@@ -9,8 +9,17 @@ import numpy as np
 
 from handover.controllers.free_flyer.body import FlyerBody, InvalidControllerParameters, stability_faults
 from handover.controllers.free_flyer.gains import ImpedanceGains, published_gains
-from handover.controllers.free_flyer.ports import ARM, INERTIA, MASS, PERIOD, TERMINALS, Behaviour, Inputs, Outputs
-from handover.controllers.free_flyer.rotations import rotation_matrix, unit_quaternion
+from handover.controllers.free_flyer.ports import (
+    ARM,
+    INERTIA,
+    MASS,
+    PERIOD,
+    TERMINALS,
+    Behaviour,
+    Inputs,
+    Outputs,
+    unit_quaternion,
+)
 from handover.controllers.free_flyer.sampled_loop import SampledLoop
 from handover.cosim.blocks.plain_rotation import (
     ZERO,
@@ -21,6 +30,7 @@ from handover.cosim.blocks.plain_rotation import (
     norm,
     relative_quaternion,
     rotate,
+    rotation_matrix,
     rotation_vector,
     row_major,
     subtract,

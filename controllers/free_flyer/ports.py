@@ -1,17 +1,19 @@
-"""What a free-flyer's two controllers share: ports, behaviours, sampling period and public values of Astrobee.
+"""What a free-flyer's controllers share: ports, behaviours, sampling period and public values of Astrobee.
 
 Each controller turns the navigation's estimate and a goal into thrust. Astrobee is the robot of [Fernandes2020]; only
 where its gripper is, is assumed.
 """
 
 import enum
+import math
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Final
 
 import numpy as np
 
-from handover.cosim.blocks.ports import Vector3, Vector4, output, port
+from handover.cosim.blocks.plain_rotation import Quaternion, normalize, quaternion, quaternion_dot
+from handover.cosim.blocks.ports import Floats, Vector3, Vector4, output, port
 from handover.cosim.blocks.terminals import TerminalKind, terminal
 from handover.cosim.blocks.units import (
     Metre,
@@ -82,3 +84,25 @@ TERMINALS = (
     terminal("command", TerminalKind.WRENCH, "f_cmd", "tau_cmd"),
 )
 """What of a controller's ports is connected together."""
+
+
+class InvalidOrientation(ValueError):
+    """A quaternion that is zero or not finite, which is no orientation; nothing has changed."""
+
+    is_refusal = True
+
+    def __init__(self, block: str, name: str, q: Floats) -> None:
+        super().__init__(f"{block}: {name} = {np.asarray(q).tolist()} must be finite and not zero")
+        self.name = name
+
+
+def unit_quaternion(q: Floats, block: str, name: str) -> Quaternion:
+    """Return a port's or a parameter's quaternion, scalar first, divided by its norm.
+
+    Raises:
+        InvalidOrientation: it is zero or not finite.
+    """
+    given = quaternion(q)
+    if not 1e-12 < quaternion_dot(given, given) < math.inf:
+        raise InvalidOrientation(block, name, q)
+    return normalize(given)

@@ -4,17 +4,18 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from handover.controllers.free_flyer.rotations import from_rotation_vector, rotation_matrix
 from handover.cosim.blocks.plain_rotation import (
     ZERO,
     Quaternion,
     Vector,
     add,
     add_scaled,
+    from_rotation_vector,
     norm,
     quaternion_multiply,
     relative_quaternion,
     rotate,
+    rotation_matrix,
     rotation_vector,
     scale,
     subtract,

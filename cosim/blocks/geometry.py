@@ -4,19 +4,28 @@
 of `R_WB` with its scalar part first. A frame is a single capital letter; FRAMES lists them all, but for those of a few
 lines, as P of any point.
 
-Rotations are computed here and not by SciPy's `Rotation`: that is made for many rotations at once and takes ten times
-as long for one, and importing it takes longer than all other imports of a camera or a hand together. `Pinhole` is a
-calibrated camera with the radial and tangential distortion of its lens (Brown and Conrady).
+Rotations are computed by `plain_rotation` and not by SciPy's `Rotation`: that is made for many rotations at once and
+takes ten times as long for one, and importing it takes longer than all other imports of a camera or a hand together.
+`Pinhole` is a calibrated camera with the radial and tangential distortion of its lens (Brown and Conrady).
 """
 
-import math
 from typing import Final
 
 import numpy as np
 
+from handover.cosim.blocks.plain_rotation import (
+    Quaternion,
+    from_rotation_vector,
+    norm,
+    normalize,
+    quaternion,
+    quaternion_dot,
+    rotation_matrix,
+    rotation_vector,
+    vector,
+)
 from handover.cosim.blocks.ports import Floats
 
-_SMALL_ANGLE = 1e-3  # rad
 _CONVERGED = 1e-9  # of a Newton step, whose error is some hundredth of its square
 _UNIT_TOLERANCE = 1e-6  # of a quaternion's length
 _MIN_DEPTH = 0.02  # m; points nearer to the lens, or behind it, are not projected
@@ -45,20 +54,15 @@ def rotation_of(q_AB: Floats) -> Floats:
     Raises:
         ValueError: q_AB is zero.
     """
-    w, x, y, z = np.asarray(q_AB, dtype=np.float64).tolist()
-    return _matrix(*_normed(x, y, z, w))
+    q = quaternion(np.asarray(q_AB, dtype=np.float64))
+    if quaternion_dot(q, q) == 0.0:
+        raise ValueError("a quaternion of length 0 is no rotation")
+    return _matrix(normalize(q))
 
 
 def rotation_by(r_AB: Floats) -> Floats:
-    """Return R_AB, shape (3, 3), of the rotation vector r_AB, shape (3,): its direction is the axis, its length in rad.
-
-    The quaternion is (cos(a/2), sin(a/2)/a r_AB) for a rotation by a = |r_AB|, by its series where a is small.
-    """
-    x, y, z = np.asarray(r_AB, dtype=np.float64).tolist()
-    a = math.sqrt(x * x + y * y + z * z)
-    a2 = a * a
-    scale = math.sin(a / 2) / a if a > _SMALL_ANGLE else 0.5 - a2 / 48 + a2 * a2 / 3840
-    return _matrix(scale * x, scale * y, scale * z, math.cos(a / 2))
+    """Return R_AB, shape (3, 3), of the rotation vector r_AB, shape (3,): along the axis, as long as the angle, rad."""
+    return _matrix(from_rotation_vector(vector(np.asarray(r_AB, dtype=np.float64))))
 
 
 def quaternion_of(R_AB: Floats) -> Floats:
@@ -76,7 +80,7 @@ def quaternion_of(R_AB: Floats) -> Floats:
         j, k = (i + 1) % 3, (i + 2) % 3
         q = [0.0, 0.0, 0.0, R[k][j] - R[j][k]]
         q[i], q[j], q[k] = 1.0 - trace + 2.0 * R[i][i], R[j][i] + R[i][j], R[k][i] + R[i][k]
-    x, y, z, w = _normed(*q)
+    w, x, y, z = normalize((q[3], q[0], q[1], q[2]))
     return np.array([w, x, y, z] if (w, x, y, z) >= (0.0, 0.0, 0.0, 0.0) else [-w, -x, -y, -z])
 
 
@@ -95,24 +99,13 @@ def looking_at(p_WC: Floats, p_WT: Floats) -> Floats:
     return np.column_stack([x, np.cross(z, x), z])
 
 
-def _normed(x: float, y: float, z: float, w: float) -> tuple[float, float, float, float]:
-    length = math.sqrt(x * x + y * y + z * z + w * w)
-    if length == 0.0:
-        raise ValueError("a quaternion of length 0 is no rotation")
-    return x / length, y / length, z / length, w / length
+def rotation_angle(R_AB: Floats) -> float:
+    """Return the angle of a rotation matrix, from 0 to pi, in rad."""
+    return norm(rotation_vector(quaternion(quaternion_of(R_AB))))
 
 
-def _matrix(x: float, y: float, z: float, w: float) -> Floats:
-    """Return the rotation matrix of a unit quaternion, summed in SciPy's order: results agree bit by bit."""
-    xx, yy, zz, ww = x * x, y * y, z * z, w * w
-    xy, xz, yz, xw, yw, zw = x * y, x * z, y * z, x * w, y * w, z * w
-    return np.array(
-        [
-            [xx - yy - zz + ww, 2.0 * (xy - zw), 2.0 * (xz + yw)],
-            [2.0 * (xy + zw), -xx + yy - zz + ww, 2.0 * (yz - xw)],
-            [2.0 * (xz - yw), 2.0 * (yz + xw), -xx - yy + zz + ww],
-        ]
-    )
+def _matrix(q_AB: Quaternion) -> Floats:
+    return np.array(rotation_matrix(q_AB)).reshape(3, 3)
 
 
 class InvalidCalibration(ValueError):

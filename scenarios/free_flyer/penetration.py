@@ -60,7 +60,7 @@ class Solid:
 
 def robot_solids(name: str, p_WB: Floats, q_WB: Floats, p_BG: Floats) -> list[Solid]:
     """Return cube and arm of a robot whose centre of mass is at p_WB, and whose gripper at p_BG in its frame, m."""
-    R = rotation_of(q_WB / np.linalg.norm(q_WB))
+    R = rotation_of(q_WB)
     edge, palm = _edge(), float(paper_values("free_flyer", "person")["palm_depth"])
     near, far = -edge / 2.0, float(p_BG[0]) + palm
     solids = [Solid(f"{name}'s cube", p_WB, R, np.full(3, edge / 2.0))]
@@ -121,8 +121,7 @@ def _faults_of_hands(
     middle, radius = array_of(person, "p_WH_0"), float(array_of(person, "fist_radius")[0])
     hands = [middle]
     if "hand_spacing" in has and int(array_of(person, "hands")[0]) > 1:
-        q = array_of(person, "q_WH_0")
-        aside = rotation_of(q / np.linalg.norm(q))[:, 1] * float(array_of(person, "hand_spacing")[0]) / 2.0
+        aside = rotation_of(array_of(person, "q_WH_0"))[:, 1] * float(array_of(person, "hand_spacing")[0]) / 2.0
         hands = [middle + aside, middle - aside]
     name = f"{person.name}.p_WH_0"
     faults: list[str] = []
@@ -150,9 +149,8 @@ def _faults_of_object(person: PlacedUnit, starts: Sequence[Solid]) -> list[str]:
     has = person.description.parameters
     if not {"p_WO_0", "q_WO_0", "object_size"} <= has.keys() or not _is_free(person):
         return []
-    q = array_of(person, "q_WO_0")
     half = array_of(person, "object_size") / 2.0
-    thing = Solid("the object", array_of(person, "p_WO_0"), rotation_of(q / np.linalg.norm(q)), half)
+    thing = Solid("the object", array_of(person, "p_WO_0"), rotation_of(array_of(person, "q_WO_0")), half)
     return [
         penetration_fault(f"{person.name}.p_WO_0", "the object would start", s.name, *s.depth_of(thing)) for s in starts
     ]

@@ -16,7 +16,7 @@ from handover.controllers.helix.vision.ball_fit import BallFit
 from handover.controllers.helix.vision.markers import NO_MARKERS, MarkerReader, MarkerRing, Markers
 from handover.controllers.helix.vision.ring_fit import RingFit, RingPose
 from handover.controllers.helix.vision.stereo import BallPosition, Pixels, Region, WristPosition, covariance
-from handover.cosim.blocks.geometry import Pinhole
+from handover.cosim.blocks.geometry import Pinhole, rotation_angle
 from handover.cosim.blocks.ports import Floats
 
 _BALL_MARGIN = 22.0  # px around where the ball was; at ten pictures a second, one faster than 0.2 m/s is searched anew
@@ -199,9 +199,3 @@ class JointDetector:
         J = np.concatenate([np.eye(3), self._d_gripper * pose.R_WR @ _LEVER], axis=1)
         p_WG = pose.p_WR + self._d_gripper * pose.R_WR[:, 2]
         return WristPosition(pose.p_WR, p_WG, cov[:3, :3], J @ cov @ np.transpose(J))
-
-
-def rotation_angle(R: Floats) -> float:
-    """Return the angle of a rotation, in rad, from 0 to pi."""
-    sine = 0.5 * float(np.linalg.norm(np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])))
-    return float(np.arctan2(sine, 0.5 * (np.trace(R) - 1.0)))

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from handover.cosim.blocks.block import InvalidParameters
-from handover.cosim.blocks.ports import Floats, Vector3, Vector4, parameter
+from handover.cosim.blocks.plain_rotation import column, normalize, quaternion, rotation_matrix
+from handover.cosim.blocks.ports import Vector3, Vector4, parameter
 from handover.cosim.blocks.units import (
     Hertz,
     Kilogram,
@@ -302,14 +303,9 @@ class Params(ContactParams, TrackParams):
 
     def _start_gap(self) -> float:
         """Return the room between fist and object at the start, the object taken as a rod along its long side."""
-        y = _long_axis(np.asarray(self.q_WO_0))
+        y = np.array(column(rotation_matrix(normalize(quaternion(np.asarray(self.q_WO_0)))), 1))
         apart = np.asarray(self.p_WH_0) - self.p_WO_0
         half = float(self.object_size[1]) / 2.0
         nearest = apart - y * min(max(float(apart @ y), -half), half)
         thick = max(float(self.object_size[0]), float(self.object_size[2])) / 2.0
         return float(np.linalg.norm(nearest)) - self.fist_radius - thick
-
-
-def _long_axis(q: Floats) -> Floats:
-    w, x, y, z = (q / np.linalg.norm(q)).tolist()
-    return np.array([2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x)])

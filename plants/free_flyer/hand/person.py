@@ -14,6 +14,7 @@ from handover.cosim.blocks.plain_rotation import (
     dot,
     lerp,
     nlerp,
+    normalize,
     quaternion,
     quaternion_multiply,
     rotate,
@@ -86,8 +87,7 @@ class FlyerPerson:
         pull = np.asarray(params.pull_direction) / np.linalg.norm(params.pull_direction)
         self._pull = vector(pull)
         self.rest = vector(params.p_WH_0)
-        q = np.asarray(params.q_WH_0) / np.linalg.norm(params.q_WH_0)
-        self._rest_q = quaternion(q)
+        self._rest_q = normalize(quaternion(np.asarray(params.q_WH_0)))
         self._end = vector(params.p_OH)
         self._offered = vector(params.p_OG)
         self.activity = Activity.WAIT

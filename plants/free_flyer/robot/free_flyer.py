@@ -15,6 +15,7 @@ from handover.cosim.blocks.plain_rotation import (
     add,
     add_cross,
     inverse_rotate,
+    normalize,
     quaternion,
     rotate,
     rotation_matrix,
@@ -157,7 +158,7 @@ class FreeFlyer:
         params.check()
         self._substep, self._turn, self._lock_time = params.substep, params.turn, params.lock_time
         self._torque_max = params.of_joints(params.torque_max_J)
-        q = quaternion(np.asarray(params.q_WB_0) / np.linalg.norm(params.q_WB_0))
+        q = normalize(quaternion(np.asarray(params.q_WB_0)))
         p_BG, p_WB, v_WB, w_WB = (vector(a) for a in (params.p_BG, params.p_WB_0, params.v_WB_0, params.w_WB_0))
         if params.joints == 0:
             self._body: RigidBody | StoppingJoints = RigidBody(params.mass, params.I_B, p_BG, p_WB, q, v_WB, w_WB)

@@ -18,7 +18,7 @@ from handover.controllers.free_flyer.arm_model import (
     mass_matrix,
     operational_bias,
 )
-from handover.cosim.blocks.geometry import rotation_of
+from handover.cosim.blocks.geometry import rotation_angle, rotation_of
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.cosim.system.signals import Signals
@@ -149,8 +149,7 @@ class ArmImpedanceEvaluator(Evaluator):
         self._rows.append([t, *(signals[name] for name in SIGNALS), *hand_push_at(signals)])
         self._saturated += bool(signals["thrusters.saturated"])
         away = float(np.linalg.norm(signals["robot.p_WG"] - self._p_WG))
-        cosine = (np.trace(np.transpose(self._R_WG) @ rotation_of(signals["robot.q_WG"])) - 1.0) / 2.0
-        turned = math.acos(min(1.0, max(-1.0, float(cosine))))
+        turned = rotation_angle(np.transpose(self._R_WG) @ rotation_of(signals["robot.q_WG"]))
         self._greatest = [max(self._greatest[0], away), max(self._greatest[1], turned)]
         self._t, self._spins = t, float(np.linalg.norm(signals["robot.w_WB"])) > SPINNING
         if away > REST_POSITION or turned > REST_ANGLE:

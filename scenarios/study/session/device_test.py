@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from handover.cosim.blocks.plain_rotation import quaternion, rotation_vector
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.live_inputs import LedHand
@@ -106,8 +107,5 @@ def _places(rest: Floats) -> list[tuple[str, Floats | None]]:
 
 def _is_turned(q_WH: Floats, name: str) -> bool:
     """Return whether the hand is turned from its rest, where its axes are those of W, as far as is asked for."""
-    w, *v = q_WH.tolist()
-    sine = float(np.linalg.norm(v))
-    angle = 2.0 * float(np.arctan2(sine, abs(w))) * (1.0 if w >= 0.0 else -1.0)
-    turned = float(np.dot(v, dict(_TURNS)[name[1:]])) / sine * angle if sine > 0.0 else 0.0
+    turned = float(np.dot(rotation_vector(quaternion(q_WH)), dict(_TURNS)[name[1:]]))
     return (turned if name[0] == "+" else -turned) >= _ANGLE

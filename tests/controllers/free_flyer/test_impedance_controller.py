@@ -14,8 +14,7 @@ from support.wording import Wording
 
 from handover.controllers.free_flyer.body import InvalidControllerParameters
 from handover.controllers.free_flyer.impedance_controller import ImpedanceController, Inputs, Params
-from handover.controllers.free_flyer.ports import Behaviour
-from handover.controllers.free_flyer.rotations import InvalidOrientation
+from handover.controllers.free_flyer.ports import Behaviour, InvalidOrientation, unit_quaternion
 from handover.cosim.blocks.geometry import rotation_of
 from handover.cosim.blocks.ports import Floats
 
@@ -160,3 +159,4 @@ def test_what_cannot_be_is_refused_all_at_once(wording: Wording):
 def test_orientation_that_is_none_is_refused(q: Floats):
     with pytest.raises(InvalidOrientation, match="q_WB_meas"):
         ImpedanceController(Params()).step(0.0, T, Inputs(q_WB_meas=q))
+    assert unit_quaternion(np.array([0.0, 0.0, -2.0, 0.0]), "block", "q") == (0.0, 0.0, -1.0, 0.0)

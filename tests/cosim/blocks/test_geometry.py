@@ -14,6 +14,7 @@ from handover.cosim.blocks.geometry import (
     Pinhole,
     looking_at,
     quaternion_of,
+    rotation_angle,
     rotation_by,
     rotation_of,
     skew,
@@ -36,7 +37,9 @@ def test_matrices_quaternions_and_rotation_vectors_of_each_other():
         wanted = there.as_quat(canonical=True, scalar_first=True)
         np.testing.assert_allclose(quaternion_of(rotation_of(q)), wanted, rtol=0.0, atol=1e-15)
     for r in TURNS:
-        np.testing.assert_allclose(rotation_by(r), Rotation.from_rotvec(r).as_matrix(), rtol=0.0, atol=1e-15)
+        turn = Rotation.from_rotvec(r)
+        np.testing.assert_allclose(rotation_by(r), turn.as_matrix(), rtol=0.0, atol=1e-15)
+        np.testing.assert_allclose(rotation_angle(rotation_by(r)), turn.magnitude(), rtol=1e-12, atol=1e-15)
     with pytest.raises(ValueError, match="length 0"):
         rotation_of(np.zeros(4))
 
