@@ -16,7 +16,7 @@ from handover.cosim.stepping.interface import Interface
 from handover.cosim.stepping.jacobi import Jacobi
 from handover.cosim.stepping.options import Algorithm, Extrapolation, MasterOptions
 from handover.cosim.stepping.solvers import FixedPoint, InterfaceNewton, InterfaceSolver
-from handover.cosim.stepping.stepper import AskingCoupling, Coupling, GridStepper, Stepper
+from handover.cosim.stepping.stepper import Coupling, GridStepper, Stepper
 from handover.cosim.system.loops import Group, check_cycles, check_loops, groups_of_data_flow
 from handover.cosim.system.schedule import Schedule
 from handover.cosim.system.system import System
@@ -74,13 +74,7 @@ class StepperFactory:
         ensemble.initialize(schedule.slots, values, stops, self.tolerances)
 
     def couple(self, ensemble: Ensemble) -> Coupling:
-        """Return the coupling of the algorithm; where there are inputs from outside, it asks for them."""
-        coupling = self._coupling(ensemble)
-        if not ensemble.external_inputs or self._options.adaptive is not None:  # an adaptive stepper asks by itself
-            return coupling
-        return AskingCoupling(coupling, ensemble.external_inputs)
-
-    def _coupling(self, ensemble: Ensemble) -> Coupling:
+        """Return the coupling of the algorithm."""
         match self._options.algorithm:
             case Algorithm.JACOBI:
                 return Jacobi(ensemble, self.schedule.groups, self._solver)
@@ -109,7 +103,7 @@ class StepperFactory:
             ensemble.extrapolate(self.schedule.tick if control is None else fine_tick(self.schedule, control))
         if control is not None:
             return AdaptiveStepper(self.schedule, coupling, ensemble, control, self._options.order)
-        return GridStepper(self.schedule, coupling, ensemble.extrapolation)
+        return GridStepper(self.schedule, coupling, ensemble)
 
     def _groups(self) -> Sequence[Group]:
         """Return the units that are not sampled, in groups that iterate together at each step."""

@@ -94,7 +94,7 @@ class AdaptiveStepper:
     def arrive(self, last: int) -> bool:
         """Let the sampled units that are due act; see `Stepper`."""
         self._last = last * self._per_tick
-        self._ensemble.external_inputs.ask(self.time)  # not the coupling, which also arrives where steps are tried
+        self._ensemble.external_inputs.ask(self.time)
         due = [s for s in self._schedule.sampled if self._due[s.unit] == self._tick > self._acted[s.unit]]
         self._coupling.arrive(self.time, due, ())
         for slot in due:
@@ -121,18 +121,16 @@ class AdaptiveStepper:
 
     def get_state(self) -> Mapping[str, Any]:
         """Return the ticks, the step wanted, and the state of step control and extrapolation; see `Stepper`."""
-        extrapolation = self._ensemble.extrapolation
         return {
             "tick": self._tick,
             "due": dict(self._due),
             "acted": dict(self._acted),
             "wanted": self._wanted,
             "coupling": self._coupling.get_state(),
-            "external": self._ensemble.external_inputs.get_state(),
             "controller": self._controller.get_state(),
             "largest": self._error.get_state(),
             "statistics": dataclasses.asdict(self.statistics),
-            **({} if extrapolation is None else {"lines": extrapolation.get_state()}),
+            **self._ensemble.get_input_state(),
         }
 
     def set_state(self, state: Mapping[str, Any]) -> None:
@@ -141,12 +139,10 @@ class AdaptiveStepper:
         self._due, self._acted = dict(state["due"]), dict(state["acted"])
         self.time = self._times.time(self._tick)
         self._coupling.set_state(state["coupling"])
-        self._ensemble.external_inputs.set_state(state["external"])
         self._controller.set_state(state["controller"])
         self._error.set_state(state["largest"])
         self.statistics = StepStatistics(**state["statistics"])
-        if self._ensemble.extrapolation is not None:
-            self._ensemble.extrapolation.set_state(state["lines"])
+        self._ensemble.set_input_state(state)
 
     def _attempt(self, length: int) -> bool:
         """Try a step from the present states of the units; return whether it was accepted."""

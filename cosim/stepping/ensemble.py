@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Collection, Generator, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 from handover.cosim.exceptions import CosimError, InvalidFmu
 from handover.cosim.files import scratch_folder
@@ -188,6 +189,18 @@ class Ensemble:
     def extrapolate(self, tick: Fraction) -> None:
         """Extrapolate inputs linearly from now, the start, on; steps are multiples of `tick`, in seconds."""
         self.extrapolation = LinearExtrapolation(self.system, self.instances, tick)
+
+    def get_input_state(self) -> dict[str, Any]:
+        """Return what is kept of inputs that come from outside or are extrapolated, for `set_input_state`."""
+        external = {"external": self.external_inputs.get_state()} if self.external_inputs else {}
+        return external if self.extrapolation is None else {**external, "lines": self.extrapolation.get_state()}
+
+    def set_input_state(self, state: Mapping[str, Any]) -> None:
+        """Restore what `get_input_state` returned, which may be part of a mapping."""
+        if self.external_inputs:
+            self.external_inputs.set_state(state["external"])
+        if self.extrapolation is not None:
+            self.extrapolation.set_state(state["lines"])
 
     def feed(self, unit: str, t: float, dt: float | None = None) -> None:
         """Set a unit's inputs from their sources: as those are, or extrapolated for a step from t to t + dt.

@@ -66,6 +66,7 @@ class EventStepper:
         if flagged or self._is_between():
             self._roll_back()
         present = self._present()
+        self._ensemble.external_inputs.ask(self.time)
         self._coupling.arrive(self.time, [], self._continuous())
         self._iteration.settle(self.time, flagged, present)
         for unit in present:
@@ -117,6 +118,7 @@ class EventStepper:
             "acted": {n: str(t) for n, t in self._acted.items()},
             "courses": {n: [str(c.begun), str(c.reached), c.event] for n, c in self._courses.items()},
             "units": {n: i.get_timing() for n, i in self._ensemble.event_units.items()},
+            **self._ensemble.get_input_state(),
         }
 
     def set_state(self, state: Mapping[str, Any]) -> None:
@@ -130,6 +132,7 @@ class EventStepper:
         for name, timing in state["units"].items():
             self._ensemble.event_units[name].set_timing(timing)
         self._ensemble.set_begins(state["begins"])
+        self._ensemble.set_input_state(state)
         self._coupling.set_state(state["coupling"])
 
     def _present(self) -> list[str]:

@@ -7,8 +7,7 @@ these get inputs, step and give outputs.
 from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
-from handover.cosim.stepping.external_inputs import ExternalInputs
-from handover.cosim.stepping.extrapolation import LinearExtrapolation
+from handover.cosim.stepping.ensemble import Ensemble
 from handover.cosim.stepping.iteration import IterationCount
 from handover.cosim.system.schedule import Schedule, Slot
 
@@ -69,54 +68,12 @@ class Coupling(Protocol):
         ...
 
 
-class AskingCoupling:
-    """A coupling that asks for the inputs from outside before it arrives at a communication point.
-
-    Args:
-        coupling: passes them on, and does all else.
-        inputs: what is asked for.
-    """
-
-    def __init__(self, coupling: Coupling, inputs: ExternalInputs) -> None:
-        self._coupling, self._inputs = coupling, inputs
-        self.count: IterationCount = coupling.count
-
-    def arrive(self, t: float, sampled: Sequence[Slot], continuous: Sequence[Slot]) -> None:
-        """Ask, then bring the signals to what observers see at t.
-
-        Raises:
-            InvalidExternalValue: an input cannot take what its source gave.
-        """
-        self._inputs.ask(t)
-        self._coupling.arrive(t, sampled, continuous)
-
-    def depart(self, t: float, sampled: Sequence[Slot], continuous: Sequence[Slot]) -> None:
-        """Step the units that are due, from t."""
-        self._coupling.depart(t, sampled, continuous)
-
-    def get_state(self) -> Mapping[str, Any]:
-        """Return the coupling's state, and the values that hold."""
-        return {"coupling": self._coupling.get_state(), "external": self._inputs.get_state()}
-
-    def set_state(self, state: Mapping[str, Any]) -> None:
-        """Restore what `get_state` returned."""
-        self._coupling.set_state(state["coupling"])
-        self._inputs.set_state(state["external"])
-
-
 class GridStepper:
-    """Communication points are whole ticks of the schedule's grid at which a unit is due: counted, so without drift.
+    """Communication points are whole ticks of the schedule's grid at which a unit is due: counted, so without drift."""
 
-    `extrapolation` sets the inputs that are extrapolated; None where all are held.
-    """
-
-    def __init__(
-        self, schedule: Schedule, coupling: Coupling, extrapolation: LinearExtrapolation | None = None
-    ) -> None:
-        self._extrapolation = extrapolation
+    def __init__(self, schedule: Schedule, coupling: Coupling, ensemble: Ensemble) -> None:
         self.time = schedule.time(0)
-        self._schedule = schedule
-        self._coupling = coupling
+        self._schedule, self._coupling, self._ensemble = schedule, coupling, ensemble
         self._tick = 0
         self._due: dict[str, int] = {s.unit: 0 for s in schedule.slots}
         self._acted: dict[str, int] = {s.unit: -1 for s in schedule.sampled}
@@ -125,6 +82,7 @@ class GridStepper:
         """Go to the next tick at which a unit is due; see `Stepper`."""
         self._tick = min((last, *self._due.values()))
         self.time = self._schedule.time(self._tick)
+        self._ensemble.external_inputs.ask(self.time)
         sampled = [s for s in self._schedule.sampled if self._due[s.unit] == self._tick > self._acted[s.unit]]
         continuous = [s for s in self._schedule.continuous if self._due[s.unit] == self._tick]
         self._coupling.arrive(self.time, sampled, continuous)
@@ -141,17 +99,14 @@ class GridStepper:
             self._due[slot.unit] += slot.every
 
     def get_state(self) -> Mapping[str, Any]:
-        """Return the ticks, the coupling's state and that of extrapolated inputs; see `Stepper`."""
-        inputs = self._extrapolation
-        extrapolation = {} if inputs is None else {"lines": inputs.get_state()}
+        """Return the ticks, and the states of the coupling and of inputs; see `Stepper`."""
         ticks = {"tick": self._tick, "due": dict(self._due), "acted": dict(self._acted)}
-        return {**ticks, "coupling": self._coupling.get_state(), **extrapolation}
+        return {**ticks, "coupling": self._coupling.get_state(), **self._ensemble.get_input_state()}
 
     def set_state(self, state: Mapping[str, Any]) -> None:
         """Restore the ticks that `get_state` returned."""
         self._tick = state["tick"]
         self._due, self._acted = dict(state["due"]), dict(state["acted"])
         self._coupling.set_state(state["coupling"])
-        if self._extrapolation is not None:
-            self._extrapolation.set_state(state["lines"])
+        self._ensemble.set_input_state(state)
         self.time = self._schedule.time(self._tick)

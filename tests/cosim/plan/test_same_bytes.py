@@ -163,7 +163,7 @@ def test_each_goes_on_from_the_others_state(fmu: FmuOf):
         with Master(seeing(fmu)) as master:
             plan, last = master.stepper, master.schedule.ticks(Fraction(2))
             assert isinstance(plan, PlanStepper)
-            general = GridStepper(master.schedule, plan.coupling)
+            general = GridStepper(master.schedule, plan.coupling, master.ensemble)
             first, second = (plan, general) if plan_first else (general, plan)
             go(first, 37)
             second.set_state(first.get_state())

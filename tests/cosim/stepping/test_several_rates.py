@@ -9,12 +9,13 @@ import pytest
 from support.cosim.native_units import native_fmu
 from support.cosim.observed_rows import observed_rows
 
+from handover.cosim.master.master import Master
 from handover.cosim.stepping.extrapolation import SampleHistory
 from handover.cosim.stepping.iteration import IterationCount
 from handover.cosim.stepping.options import AdaptiveStep, Algorithm, Extrapolation, MasterOptions
 from handover.cosim.stepping.stepper import GridStepper
 from handover.cosim.system.conversion import LinearTransformation
-from handover.cosim.system.schedule import Schedule, Slot
+from handover.cosim.system.schedule import Slot
 from handover.cosim.system.system import System
 
 SIGNALS = ("ramp.y", "slow.x", "fast.x")
@@ -83,20 +84,20 @@ class Counting:
     def set_state(self, state: Mapping[str, Any]) -> None: ...
 
 
-def thirds_and_sevenths() -> Schedule:
+def thirds_and_sevenths() -> System:
     s = System()
     for name, period in (("third", THIRD), ("seventh", SEVENTH)):
         s.add(name, native_fmu("integrator"), period=period)
-    return Schedule(s)
+    return s
 
 
 @pytest.mark.parametrize("first", [0, 10**7 - 21_000, 10**15])
 def test_instants_are_exact_however_late(first: int):
     """Times are those, rounded once, of every tick that 7 (a third of 1 ms) or 3 (a seventh) divides."""
-    schedule, last = thirds_and_sevenths(), first + 21_000
-    assert schedule.tick == Fraction(1, 21_000)
-    counting = Counting()
-    stepper = GridStepper(schedule, counting)
+    counting, last = Counting(), first + 21_000
+    with Master(thirds_and_sevenths()) as master:
+        stepper = GridStepper(master.schedule, counting, master.ensemble)
+    assert master.schedule.tick == Fraction(1, 21_000)
     due = {"third": -(-first // 7) * 7, "seventh": -(-first // 3) * 3}
     stepper.set_state({"tick": first, "due": due, "acted": {}, "coupling": {}})
     times: list[float] = []
