@@ -21,6 +21,7 @@ from support.documentation import PAGES, ROOT, TEXT, TEXTS, blocks
 from support.in_process_pool import use_in_process_pool
 from support.kept_runs import copied_run, kept_run
 
+from handover.cosim.stepping.options import Algorithm
 from handover.fmus import interpreter
 from handover.fmus.compile import TARGETS
 from handover.scenarios.cli.command import main
@@ -59,6 +60,16 @@ def test_the_citation_is_of_this_version():
         for file in ("CITATION.cff", "pyproject.toml")
     )
     assert cited == own != []
+
+
+def test_the_guide_lists_the_algorithms_that_there_are_with_their_traits():
+    rows = [
+        (f"`{a.value}`", a.summary, "cycles" if a.iterates else "algebraic loops", "yes" if t.in_plan else "no")
+        for a in Algorithm
+        for t in (a.coupling.traits,)
+    ]
+    table = TEXTS["master"].partition("## Algorithms")[2].strip().partition("\n\n")[0]
+    assert table.splitlines()[2:] == [f"| {' | '.join(row)} |" for row in rows]
 
 
 def test_every_path_that_is_linked_exists():

@@ -10,12 +10,10 @@ from handover.cosim.stepping.adaptive_stepper import AdaptiveStepper, check_cont
 from handover.cosim.stepping.ensemble import CleanupStack, Ensemble
 from handover.cosim.stepping.event_ensemble import EventEnsemble
 from handover.cosim.stepping.event_stepper import EventStepper, check_off_grid, has_events
-from handover.cosim.stepping.gauss_seidel import GaussSeidel
 from handover.cosim.stepping.initial_values import InitialValues
 from handover.cosim.stepping.interface import Interface
-from handover.cosim.stepping.jacobi import Jacobi
 from handover.cosim.stepping.options import Algorithm, Extrapolation, MasterOptions
-from handover.cosim.stepping.solvers import FixedPoint, InterfaceNewton, InterfaceSolver
+from handover.cosim.stepping.solvers import InterfaceSolver
 from handover.cosim.stepping.stepper import Coupling, GridStepper, Stepper
 from handover.cosim.system.loops import Group, check_cycles, check_loops, groups_of_data_flow
 from handover.cosim.system.schedule import Schedule
@@ -75,15 +73,11 @@ class StepperFactory:
 
     def couple(self, ensemble: Ensemble) -> Coupling:
         """Return the coupling of the algorithm."""
-        match self._options.algorithm:
-            case Algorithm.JACOBI:
-                return Jacobi(ensemble, self.schedule.groups, self._solver)
-            case Algorithm.GAUSS_SEIDEL | Algorithm.FIXED_POINT | Algorithm.NEWTON:
-                groups = self.schedule.sampled_groups, self._continuous
-                interpolates = self._options.extrapolation is Extrapolation.LINEAR  # up to a value at a step's end
-                steps_together = self._options.adaptive is not None
-                late = () if interpolates or steps_together else self.schedule.spanning
-                return GaussSeidel(ensemble, *groups, self._solver, late)
+        groups = self.schedule.sampled_groups, self._continuous
+        interpolates = self._options.extrapolation is Extrapolation.LINEAR  # up to a value at a step's end
+        steps_together = self._options.adaptive is not None
+        late = () if interpolates or steps_together else self.schedule.spanning
+        return self._options.algorithm.coupling(ensemble, *groups, self._solver, late)
 
     def stepper(self, ensemble: Ensemble, coupling: Coupling) -> Stepper:
         """Return a stepper for initialised units, which is a compiled plan where that does the same.
@@ -110,9 +104,9 @@ class StepperFactory:
         if not self._options.algorithm.iterates:
             return self.schedule.continuous_groups
         groups = groups_of_data_flow(self._system, [s.unit for s in self.schedule.continuous], self.schedule.loops)
-        check_cycles(self._system, groups)
+        check_cycles(self._system, groups, [a.value for a in Algorithm if not a.iterates])
         return groups
 
     def _solver(self, interface: Interface) -> InterfaceSolver:
-        kind = FixedPoint if self._options.algorithm is Algorithm.FIXED_POINT else InterfaceNewton
-        return kind(interface.magnitudes(self._options.tolerance), self._options.max_iterations)
+        solver = self._options.algorithm.coupling.traits.solver
+        return solver(interface.magnitudes(self._options.tolerance), self._options.max_iterations)

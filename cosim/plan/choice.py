@@ -11,7 +11,7 @@ from handover.cosim.plan.plan_maker import PlanMaker
 from handover.cosim.plan.plan_stepper import PlanStepper
 from handover.cosim.stepping.ensemble import Ensemble
 from handover.cosim.stepping.event_stepper import has_events
-from handover.cosim.stepping.options import Algorithm, Extrapolation, MasterOptions
+from handover.cosim.stepping.options import Extrapolation, MasterOptions
 from handover.cosim.stepping.stepper import Coupling
 from handover.cosim.system.port_names import PortName
 from handover.cosim.system.schedule import Schedule
@@ -34,7 +34,8 @@ def plan_stepper(
     if library is None:
         log_fallback("its library is not compiled for this machine")
         return None
-    plan = PlanMaker(ensemble, schedule, options.algorithm, library, clock=options.cpu_times)
+    parallel = coupling.traits.parallel
+    plan = PlanMaker(ensemble, schedule, library, parallel=parallel, clock=options.cpu_times)
     return PlanStepper(schedule, ensemble, coupling, plan)
 
 
@@ -49,7 +50,7 @@ def plan_obstacle(schedule: Schedule, system: System, options: MasterOptions, *,
         return "the options ask for none"
     if options.adaptive is not None or has_events(system, options):
         return "steps may end anywhere"
-    if options.algorithm not in (Algorithm.JACOBI, Algorithm.GAUSS_SEIDEL):
+    if not options.algorithm.coupling.traits.in_plan:
         return f"the coupling is {options.algorithm.value}"
     if iterates:
         return "units make a loop"

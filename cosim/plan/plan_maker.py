@@ -18,7 +18,6 @@ from handover.cosim.fmu.calls import NativeStep
 from handover.cosim.fmu.failures import UnitTerminated
 from handover.cosim.plan.memory import KeptMemory, Segment
 from handover.cosim.stepping.ensemble import Ensemble
-from handover.cosim.stepping.options import Algorithm
 from handover.cosim.stepping.pending_steps import n_sources
 from handover.cosim.stepping.transfers import FiniteCheck, Narrowing
 from handover.cosim.system.conversion import LinearTransformation
@@ -128,7 +127,7 @@ def _packed(form: str, kind: _Kind, unit: int, *fields: Any, code: int = -1) -> 
 
 
 class PlanMaker:
-    """Lays out the operations of a plan: what `Jacobi` and `GaussSeidel` do, in the same order.
+    """Lays out the operations of a plan: what `Jacobi` (`parallel`) or `GaussSeidel` does, in the same order.
 
     Attributes:
         judges: for each operation that can stop the plan, by its index, what raises the failure.
@@ -139,9 +138,7 @@ class PlanMaker:
         has_clock: whether CPU times of steps are measured.
     """
 
-    def __init__(
-        self, ensemble: Ensemble, schedule: Schedule, algorithm: Algorithm, library: CDLL, *, clock: bool
-    ) -> None:
+    def __init__(self, ensemble: Ensemble, schedule: Schedule, library: CDLL, *, parallel: bool, clock: bool) -> None:
         self.judges: dict[int, Judge] = {}
         self.calls: dict[int, tuple[str, str]] = {}
         self.groups: dict[tuple[int, bool], list[str]] = {}
@@ -155,7 +152,7 @@ class PlanMaker:
             for slot in slots:
                 self.groups.setdefault((slot.every, sampled), []).append(slot.unit)
         self._group_of = {unit: i for i, units in enumerate(self.groups.values()) for unit in units}
-        if algorithm is Algorithm.JACOBI:
+        if parallel:
             due = (*schedule.sampled, *schedule.continuous)
             isolated = [slot for slot in due if self._is_isolated(slot)]
             self._add(self.arrive, due, self._publish)

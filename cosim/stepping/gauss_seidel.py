@@ -1,19 +1,17 @@
 """Gauss-Seidel coupling: units step one after another, each from the newest values; those of a cycle iterate."""
 
 import itertools
-from collections.abc import Callable, Collection, Mapping, Sequence
-from typing import Any
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any, ClassVar
 
 from handover.cosim.stepping.ensemble import Ensemble, LastStep
 from handover.cosim.stepping.interface import Interface
 from handover.cosim.stepping.iteration import IteratedStep, IterationCount
 from handover.cosim.stepping.pending_steps import PendingSteps
-from handover.cosim.stepping.solvers import InterfaceSolver
+from handover.cosim.stepping.solvers import FixedPoint, MakeSolver
+from handover.cosim.stepping.stepper import Traits
 from handover.cosim.system.loops import Group
 from handover.cosim.system.schedule import Slot
-
-MakeSolver = Callable[[Interface], InterfaceSolver]
-"""Makes a solver for the inputs that lead back in a cycle."""
 
 
 class GroupStepping:
@@ -117,19 +115,12 @@ class GroupStepping:
 class GaussSeidel:
     """At t, sampled units act on the values at t, then observers see all signals, then the others step from t.
 
-    Units of a group with a cycle are iterated until they converge, see `IteratedStep`. With groups that hold the
-    algebraic loops only, this solves those and is Gauss-Seidel for the rest; with groups of all units whose data flow
-    is cyclic, it is the iterated (strong, implicit) coupling.
+    Units of a group with a cycle are iterated until they converge, see `IteratedStep`: here those of algebraic loops.
 
-    Source: C. Gomes et al., Co-simulation: a survey, ACM Comput. Surv. 51 (2018) 49; the iterated coupling R. Kuebler,
-    W. Schiehlen, Two methods of simulator coupling, Math. Comput. Model. Dyn. Syst. 6 (2000) 93-113.
-
-    Args:
-        ensemble: the units.
-        sampled, continuous: groups of all units, each in the order in which they step.
-        make_solver: makes a solver for each cycle.
-        late: units whose steps may span communication points of others, so that their results count when they end.
+    Source: C. Gomes et al., Co-simulation: a survey, ACM Comput. Surv. 51 (2018) 49.
     """
+
+    traits: ClassVar = Traits(summary="one unit after another, each from the newest", in_plan=True)
 
     def __init__(
         self,
@@ -137,7 +128,7 @@ class GaussSeidel:
         sampled: Sequence[Group],
         continuous: Sequence[Group],
         make_solver: MakeSolver,
-        late: Collection[str] = (),
+        late: Collection[str],
     ) -> None:
         self.count = IterationCount()
         self._ensemble, self._late = ensemble, late
@@ -167,3 +158,25 @@ class GaussSeidel:
         self._sampled.set_state(state.get("sampled", []))
         self._continuous.set_state(state.get("continuous", []))
         self.count.set_state(state.get("count", IterationCount().get_state()))
+
+
+class IteratedNewton(GaussSeidel):
+    """The iterated (strong, implicit) coupling: all units whose data flow is cyclic are iterated, not loops alone.
+
+    Source: R. Kuebler, W. Schiehlen, Two methods of simulator coupling, Math. Comput. Model. Dyn. Syst. 6 (2000)
+    93-113.
+    """
+
+    traits: ClassVar = Traits(
+        summary="in a cycle from those at a step's end, by Newton's method with rollback", iterates=True
+    )
+
+
+class IteratedFixedPoint(GaussSeidel):
+    """The same, by relaxed fixed-point iteration, which solves algebraic loops here too."""
+
+    traits: ClassVar = Traits(
+        summary="in a cycle from those at a step's end, by fixed-point iteration with rollback",
+        iterates=True,
+        solver=FixedPoint,
+    )

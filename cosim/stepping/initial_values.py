@@ -7,10 +7,9 @@ import numpy as np
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.stepping.ensemble import Ensemble
-from handover.cosim.stepping.gauss_seidel import MakeSolver
 from handover.cosim.stepping.interface import Interface
 from handover.cosim.stepping.iteration import not_converged
-from handover.cosim.stepping.solvers import Unsolved
+from handover.cosim.stepping.solvers import MakeSolver, Unsolved
 from handover.cosim.system.loops import Group
 from handover.cosim.system.system import Connection
 

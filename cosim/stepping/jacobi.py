@@ -1,12 +1,14 @@
 """Jacobi coupling: all units step from the values at a communication point, as if in parallel; loops are solved."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any, ClassVar
 
 from handover.cosim.stepping.ensemble import Ensemble, LastStep
-from handover.cosim.stepping.gauss_seidel import GroupStepping, MakeSolver
+from handover.cosim.stepping.gauss_seidel import GroupStepping
 from handover.cosim.stepping.iteration import IterationCount
 from handover.cosim.stepping.pending_steps import PendingSteps
+from handover.cosim.stepping.solvers import MakeSolver
+from handover.cosim.stepping.stepper import Traits
 from handover.cosim.system.loops import Group
 from handover.cosim.system.schedule import Slot
 
@@ -20,17 +22,18 @@ class Jacobi:
     feed each other, later ones get the results of those before.
 
     Also called the parallel scheme: C. Gomes et al., Co-simulation: a survey, ACM Comput. Surv. 51 (2018) 49.
-
-    Args:
-        ensemble: the units.
-        groups: groups of all units, those of algebraic loops together.
-        make_solver: makes a solver for each loop.
     """
 
-    def __init__(self, ensemble: Ensemble, groups: Sequence[Group], make_solver: MakeSolver) -> None:
+    traits: ClassVar = Traits(summary="all from those of one time", parallel=True, in_plan=True)
+
+    def __init__(
+        self, ensemble: Ensemble, sampled: Sequence[Group], continuous: Sequence[Group], make_solver: MakeSolver,
+        late: Collection[str],  # noqa: ARG002
+    ) -> None:  # fmt: skip
+        """Couple units; all are `late` here."""
         self._ensemble = ensemble
         self.count = IterationCount()
-        loops = [group for group in groups if group.cycle]
+        loops = [group for group in (*continuous, *sampled) if group.cycle]
         self._in_loops = {name for group in loops for name in group.units}
         self._loops = GroupStepping(ensemble, loops, make_solver, self.count)
 

@@ -9,10 +9,14 @@ import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
 from fractions import Fraction
+from importlib import import_module
 from numbers import Rational, Real
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from handover.cosim.exceptions import InvalidOptions
+
+if TYPE_CHECKING:
+    from handover.cosim.stepping.stepper import Coupling
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,38 +88,40 @@ class Extrapolation(enum.Enum):
 
 
 class Algorithm(enum.Enum):
-    """How units that are due at the same time get their inputs.
+    """How units that are due at the same time get their inputs; `summary` says it of each.
 
-    JACOBI: all from the values at that time. GAUSS_SEIDEL: one after another, each from the newest values. With both,
-    the units of an algebraic loop repeat the step after a rollback until they converge. FIXED_POINT and NEWTON: one
-    after another, and all units that are connected in a cycle do the same (iterated, strong or implicit coupling), with
-    inputs of the end of the step, by relaxed fixed-point iteration or by Newton's method. Sampled units act one after
-    another, except in loops. FIXED_POINT solves all loops, also those at the start, by its own iteration, the others by
-    Newton's method.
+    With all, the units of an algebraic loop repeat the step after a rollback until they converge; some iterate all
+    units that are connected in a cycle so (iterated, strong or implicit coupling). FIXED_POINT solves all loops, also
+    those at the start, by its own iteration, the others by Newton's method.
     """
 
-    JACOBI = "jacobi"
-    GAUSS_SEIDEL = "gauss-seidel"
-    FIXED_POINT = "fixed-point"
-    NEWTON = "newton"
+    _path: str
+    JACOBI = "jacobi", "jacobi:Jacobi"
+    GAUSS_SEIDEL = "gauss-seidel", "gauss_seidel:GaussSeidel"
+    FIXED_POINT = "fixed-point", "gauss_seidel:IteratedFixedPoint"
+    NEWTON = "newton", "gauss_seidel:IteratedNewton"
+
+    def __new__(cls, name: str, path: str) -> "Algorithm":
+        """Make a member of its name, which is its value, and `module:Class` in this folder."""
+        member = object.__new__(cls)
+        member._value_, member._path = name, path
+        return member
+
+    @property
+    def coupling(self) -> "type[Coupling]":
+        """Its class, loaded when it is asked for: options alone need none."""
+        module, _, name = self._path.partition(":")
+        return getattr(import_module(f"handover.cosim.stepping.{module}"), name)
 
     @property
     def iterates(self) -> bool:
         """Whether all units that are connected in a cycle repeat steps after a rollback."""
-        return self in (Algorithm.FIXED_POINT, Algorithm.NEWTON)
+        return self.coupling.traits.iterates
 
     @property
     def summary(self) -> str:
         """Which values units step from, for the command's help."""
-        match self:
-            case Algorithm.JACOBI:
-                return "all from those of one time"
-            case Algorithm.GAUSS_SEIDEL:
-                return "one unit after another, each from the newest"
-            case Algorithm.FIXED_POINT:
-                return "in a cycle from those at the end of the step, by fixed-point iteration with rollback"
-            case Algorithm.NEWTON:
-                return "the same by Newton's method"
+        return self.coupling.traits.summary
 
 
 CALL_LIMIT = 60.0

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
-from handover.cosim.stepping.interface import Magnitudes
+from handover.cosim.stepping.interface import Interface, Magnitudes
 
 Map = Callable[[Floats], Floats]
 """g: from the n values that go into the units to the n values that come out of them."""
@@ -40,6 +40,8 @@ class InterfaceSolver(Protocol):
 
     magnitudes: Magnitudes
 
+    def __init__(self, magnitudes: Magnitudes, max_iterations: int) -> None: ...
+
     def solve(self, g: Map, x: Floats, jacobian: Jacobian | None = None) -> Solution:
         """Solve from a first guess.
 
@@ -55,6 +57,10 @@ class InterfaceSolver(Protocol):
     def set_state(self, state: Mapping[str, Any]) -> None:
         """Restore what `get_state` returned."""
         ...
+
+
+MakeSolver = Callable[[Interface], InterfaceSolver]
+"""Makes a solver for the inputs that lead back in a cycle."""
 
 
 def residual_of(g: Map, x: Floats, iterations: int) -> Floats:

@@ -4,11 +4,14 @@ A stepper decides when communication points are and which units are due there; i
 these get inputs, step and give outputs.
 """
 
-from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, Protocol
 
 from handover.cosim.stepping.ensemble import Ensemble
 from handover.cosim.stepping.iteration import IterationCount
+from handover.cosim.stepping.solvers import InterfaceNewton, InterfaceSolver, MakeSolver
+from handover.cosim.system.loops import Group
 from handover.cosim.system.schedule import Schedule, Slot
 
 
@@ -37,19 +40,51 @@ class Stepper(Protocol):
         ...
 
 
+@dataclass(frozen=True, kw_only=True)
+class Traits:
+    """What help, checks and steppers ask of a coupling algorithm; a subclass says all of its own anew.
+
+    Attributes:
+        summary: which values units step from, in words that follow the algorithm's name in the help.
+        solver: solves algebraic loops, also at the start, and whatever else is iterated.
+        iterates: whether all units that are connected in a cycle repeat steps, which needs rollback, not loops alone.
+        parallel: whether all units step from the values at one time; else one after another.
+        in_plan: whether the loop in C does the same, as `PlanMaker` lays it out; else runs take the general path.
+    """
+
+    summary: str
+    solver: type[InterfaceSolver] = InterfaceNewton
+    iterates: bool = False
+    parallel: bool = False
+    in_plan: bool = False
+
+
 class Coupling(Protocol):
-    """Takes units from one communication point to the next.
+    """A coupling algorithm: takes units from one communication point to the next.
 
     At a communication point t, `arrive` is called, then observers see the signals, then `depart`. Both get the units
     that are due there, in the schedule's order. A slot's `period` is the step to take, in seconds. Sampled units act
     once at an instant: those that have acted are not in a later `arrive` at it, but in `depart`. With events, both can
     be called several times at one instant.
 
+    Args:
+        ensemble: the units.
+        sampled, continuous: groups of all units, each in the order in which they step. Those of algebraic loops are
+            together, or where the algorithm iterates, all that are connected in a cycle.
+        make_solver: makes a solver for each cycle.
+        late: units whose steps may span communication points of others, so that their results count when they end.
+
     Attributes:
         count: iterated steps, their iterations and rollbacks; all zero where nothing is iterated.
     """
 
+    traits: ClassVar[Traits]
     count: IterationCount
+
+    def __init__(
+        self, ensemble: Ensemble, sampled: Sequence[Group], continuous: Sequence[Group], make_solver: MakeSolver,
+        late: Collection[str],
+    ) -> None: ...  # fmt: skip
 
     def arrive(self, t: float, sampled: Sequence[Slot], continuous: Sequence[Slot]) -> None:
         """Bring the signals to what observers see at t."""

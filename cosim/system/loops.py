@@ -276,8 +276,8 @@ def unsolved_text(system: System, loop: AlgebraicLoop) -> str:
     )
 
 
-def check_cycles(system: System, groups: Sequence[Group]) -> None:
-    """Check that all units which are connected in a cycle can roll back a step.
+def check_cycles(system: System, groups: Sequence[Group], others: Sequence[str]) -> None:
+    """Check that all units which are connected in a cycle can roll back a step; `others` are the way out.
 
     Raises:
         ScheduleError: with all units that cannot.
@@ -289,7 +289,7 @@ def check_cycles(system: System, groups: Sequence[Group]) -> None:
     lines = "".join(f"\n  - {', '.join(names)} (connected in a cycle: {_list(g.units)})" for g, names in faults)
     raise ScheduleError(
         "iterating rolls steps back, which needs units that save their state (canGetAndSetFMUState), but these "
-        f"do not:{lines}\n  gauss-seidel and jacobi need no rollback, but for algebraic loops"
+        f"do not:{lines}\n  {' and '.join(others)} need no rollback, but for algebraic loops"
     )
 
 

@@ -114,11 +114,6 @@ class Schedule:
         self.spanning = frozenset(s.unit for s in self.continuous if any(every % s.every for every in others))
 
     @property
-    def groups(self) -> tuple[Group, ...]:
-        """All units in the order of `slots`, those of algebraic loops together, as at the steps."""
-        return self.continuous_groups + self.sampled_groups
-
-    @property
     def slots(self) -> tuple[Slot, ...]:
         """All units in an order in which their outputs can be computed at the start."""
         return self.continuous + self.sampled

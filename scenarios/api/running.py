@@ -80,7 +80,7 @@ def run(
         formats: of the record besides Parquet: `csv`, `mat`.
         record: local variables and parameters of units to record, too: `UNIT.NAME`, with `*` and `?` as wildcards.
         checkpoint: simulated seconds between checkpoints, from which `handover resume` continues.
-        algorithm: `jacobi`, `gauss-seidel`, `fixed-point` or `newton`.
+        algorithm: an `Algorithm`, or its value, such as `newton`.
         isolate: units in processes of their own: names, `foreign` or `all`.
         options: all options of the master; by default a call of a unit may take 60 s.
         report: whether figures and the report page are made at once; `Run.report` makes them later.

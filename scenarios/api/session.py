@@ -353,7 +353,7 @@ def open(  # noqa: A001 (handover.open is named like it)
         units: what takes the place of a scenario's units, by their names: files of FMUs, or blocks as `my_arm:MyArm`.
         start: of a system, an SSP or an FMU: the time from which it is stepped, s, as of `handover.run`.
         step: of an SSP or FMU: the communication step of all units, s.
-        algorithm: `jacobi`, `gauss-seidel`, `fixed-point` or `newton`.
+        algorithm: an `Algorithm`, or its value, such as `newton`.
         isolate: units in processes of their own: names, `foreign` or `all`.
         options: all options of the master; by default calls of units may take any time.
         parameters: parameters whose names are also those of options, or no names in Python.

@@ -12,7 +12,7 @@ from handover.cosim.master.live_control import ControlledPacer, LiveControl
 from handover.cosim.master.master import Master
 from handover.cosim.plan.memory import note_crashes
 from handover.cosim.record.recorder import Recorder
-from handover.cosim.stepping.options import Algorithm, MasterOptions
+from handover.cosim.stepping.options import MasterOptions
 from handover.cosim.system.recorded_variables import record_variables
 from handover.cosim.system.signals import ObserveAfter, Observer, Signals
 from handover.cosim.system.system import System
@@ -62,7 +62,7 @@ def experiment_system(
     """
     system = built_system(experiment, parameters, seed, fmus, unit_values)
     step = experiment.step_in_parallel(parameters)
-    if options.algorithm is Algorithm.JACOBI and step is not None:
+    if options.algorithm.coupling.traits.parallel and step is not None:
         system.set_step(step)
     return system
 

@@ -9,6 +9,7 @@ from msgspec import Meta
 from typing_extensions import NotRequired, TypedDict
 
 from handover.cosim.fmu.unit_warnings import WarningData
+from handover.cosim.stepping.options import Algorithm
 from handover.cosim.typed_data import Count, ExactSeconds, ExactTime, FilePath, NotNegative, Seed
 from handover.scenarios.results.not_finite import NotFiniteData
 
@@ -29,7 +30,7 @@ class AdaptiveData(TypedDict):
 class MasterData(TypedDict):
     """Options of the master, as of `MasterOptions.as_data`."""
 
-    algorithm: Literal["jacobi", "gauss-seidel", "fixed-point", "newton"]
+    algorithm: Annotated[str, Meta(pattern=f"^({'|'.join(a.value for a in Algorithm)})$")]
     tolerance: float
     iterations: Count
     extrapolation: str

@@ -81,11 +81,11 @@ def test_presumed_feedthrough_does_not_make_a_loop(caplog: pytest.LogCaptureFixt
 def test_units_of_a_loop_stand_together_between_those_before_and_after():
     schedule = Schedule(system("a>b", "b>c", "c>a", "b>after", direct="after b c a", plain="plant"))
     assert schedule.loops
-    assert [g.units for g in schedule.groups] == [("b", "c", "a"), ("after",), ("plant",)]
-    assert schedule.groups[0].message.startswith("b.y -> c.u, c.u feeds through to c.y, c.y -> a.u")
-    assert [str(c.source) for c in schedule.groups[0].back(["a", "b", "c"])] == ["a.y"]
-    assert [str(c.source) for c in schedule.groups[0].back(["a", "b"])] == ["a.y"]
-    assert schedule.groups[0].back(["b", "c"]) == []
+    assert [g.units for g in schedule.continuous_groups] == [("b", "c", "a"), ("after",), ("plant",)]
+    assert schedule.continuous_groups[0].message.startswith("b.y -> c.u, c.u feeds through to c.y, c.y -> a.u")
+    assert [str(c.source) for c in schedule.continuous_groups[0].back(["a", "b", "c"])] == ["a.y"]
+    assert [str(c.source) for c in schedule.continuous_groups[0].back(["a", "b"])] == ["a.y"]
+    assert schedule.continuous_groups[0].back(["b", "c"]) == []
 
 
 def test_loops_that_share_a_unit_are_one_group():
@@ -93,7 +93,7 @@ def test_loops_that_share_a_unit_are_one_group():
     inputs = {n: replace(s.units["b"].description.inputs["u"], name=n) for n in ("u", "w")}
     s.units["b"] = replace(s.units["b"], description=described(inputs=inputs, feedthrough={"y": ("u", "w")}))
     s.connect(PortName("c", "y"), PortName("b", "w"))
-    (group,) = Schedule(s).groups
+    (group,) = Schedule(s).continuous_groups
     assert set(group.units) == {"a", "b", "c"}
     assert len(group.cycle) == 4
     assert "(and 2 more connections between these outputs and inputs)" in group.message

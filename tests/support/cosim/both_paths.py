@@ -16,7 +16,7 @@ from handover.cosim.system.system import System
 
 Build = Callable[[], System]
 
-PLAIN = (Algorithm.JACOBI, Algorithm.GAUSS_SEIDEL)
+PLAIN = tuple(a for a in Algorithm if a.coupling.traits.in_plan)
 """The algorithms that a plan knows."""
 
 

@@ -87,7 +87,7 @@ def test_a_loop_is_solved_at_each_step_with_jacobi_from_what_the_others_had_befo
     assert list(rows) == pytest.approx(grid(10))
     for t, (x, y, z) in rows.items():
         assert x == pytest.approx(t)
-        known = max(t - 0.1, 0.0) if algorithm is Algorithm.JACOBI else t
+        known = max(t - 0.1, 0.0) if algorithm.coupling.traits.parallel else t
         assert (y, z) == pytest.approx(((known - 2.0) / 7.0, (3.0 * known + 1.0) / 7.0), rel=1e-6, abs=1e-9)
 
 
@@ -137,7 +137,7 @@ def test_a_cycle_of_units_that_is_none_of_reals_is_no_loop(dependencies: bool, c
     s.connect(other.y.truth, both.u.truth_in)
     schedule = Schedule(s)
     assert not schedule.loops
-    assert [g.units for g in schedule.groups] == [("both",), ("other",)]
+    assert [g.units for g in schedule.continuous_groups] == [("both",), ("other",)]
     if dependencies:
         assert "both steps first where units wait for each other; it gets the previous values of other" in caplog.text
     with Master(s) as master:
