@@ -64,8 +64,8 @@ class CleanupStack:
 class SavedStates(dict[str, State]):
     """Saved states by unit, with what the extrapolation of inputs remembers of these units."""
 
-    def __init__(self, states: Mapping[str, State], memories: Mapping[str, Memory]) -> None:
-        super().__init__(states)
+    def __init__(self, memories: Mapping[str, Memory]) -> None:
+        super().__init__()
         self.memories = memories
 
 
@@ -101,18 +101,20 @@ class LastStep:
 class Ensemble:
     """Loads a system's units and makes the calls that an algorithm asks for, one unit at a time.
 
+    Args:
+        system: the units.
+        heartbeat: notes their calls.
+        cleanups: gets what terminates and frees them; the caller closes it, also if this fails.
+        isolated: units that are loaded in processes of their own.
+
     Raises:
-        InvalidFmu: an FMU is invalid; what was loaded until then is freed.
+        InvalidFmu: an FMU is invalid.
     """
 
-    def __init__(
-        self, system: System, heartbeat: Heartbeat | None = None, cleanups: CleanupStack | None = None,
-        isolated: Collection[str] = (),
-    ) -> None:  # fmt: skip
-        """Load the units, those `isolated` in own processes. Who gives `cleanups` closes it, also if this fails."""
+    def __init__(self, system: System, heartbeat: Heartbeat, cleanups: CleanupStack, isolated: Collection[str]) -> None:
         self.system = system
         self._isolated = isolated
-        self.heartbeat = heartbeat or Heartbeat()
+        self.heartbeat = heartbeat
         self.host = HostProcess()
         """How this process was before units were loaded; it is put back after each."""
         self.instances: dict[str, Instance] = {}
@@ -122,28 +124,13 @@ class Ensemble:
         """Whether CPU time is taken of steps."""
         self.extrapolation: LinearExtrapolation | None = None
         """Sets the inputs that are extrapolated; None where all are held."""
-        self._feedings: dict[str, Feeding] = {}
-        self._finite: dict[str, FiniteCheck] = {}
-        self._cleanups = cleanups or CleanupStack()
+        self._cleanups = cleanups
         self._corrupt: set[Path] = set()
         """FMUs of which an instance returned Fatal."""
-        try:
-            self._load()
-            self._feedings = feedings(system, self.instances)
-            self.external_inputs = ExternalInputs(system, self.instances)
-            self._finite = finite_checks(system, self.instances)
-        except BaseException:
-            if cleanups is None:
-                self.close()
-            raise
-
-    def close(self) -> None:
-        """Terminate and free all units.
-
-        Raises:
-            UnitFailure: one did not terminate properly; all are freed.
-        """
-        self._cleanups.close()
+        self._load()
+        self._feedings = feedings(system, self.instances)
+        self.external_inputs = ExternalInputs(system, self.instances)
+        self._finite = finite_checks(system, self.instances)
 
     def signals(self) -> Signals:
         """Return the units' outputs and the inputs that come from outside, as they are."""
@@ -280,24 +267,9 @@ class Ensemble:
         if self.extrapolation is not None:
             self.extrapolation.publish(unit)
 
-    def save(self, units: Collection[str]) -> SavedStates:
-        """Save the states of units, of all or none; `restore` rolls back to them, `forget` frees them.
-
-        Raises:
-            UnitFailure: a unit does not give its state.
-        """
-        states = SavedStates({}, self.extrapolation.save(units) if self.extrapolation is not None else {})
-        try:
-            for name in units:
-                states[name] = self.instances[name].save_state()
-        except Exception:
-            self._forget_quietly(states)
-            raise
-        return states
-
     @contextlib.contextmanager
     def saved(self, units: Collection[str]) -> Generator[SavedStates, None, None]:
-        """Save the states of units for a while, and free them in the end.
+        """Save the states of units for a while, to which `restore` rolls back, and free them in the end.
 
         After a failure, that failure is raised and the states are freed as far as possible; a thread whose units were
         taken from it frees none.
@@ -305,8 +277,10 @@ class Ensemble:
         Raises:
             UnitFailure: a unit does not give its state.
         """
-        states = self.save(units)
+        states = SavedStates({} if self.extrapolation is None else self.extrapolation.save(units))
         try:
+            for name in units:
+                states[name] = self.instances[name].save_state()
             yield states
         except Abandoned:
             raise
@@ -315,9 +289,9 @@ class Ensemble:
             raise
         self.forget(states)
 
-    def restore(self, states: Mapping[str, State]) -> None:
+    def restore(self, states: SavedStates) -> None:
         """Set saved states and fetch the outputs that belong to them."""
-        if self.extrapolation is not None and isinstance(states, SavedStates):
+        if self.extrapolation is not None:
             self.extrapolation.restore(states.memories)
         for name, state in states.items():
             self.instances[name].restore_state(state)

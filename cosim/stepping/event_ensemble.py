@@ -28,10 +28,7 @@ class EventEnsemble(Ensemble):
         ends: how the last step of each unit ended.
     """
 
-    def __init__(
-        self, system: System, heartbeat: Heartbeat | None = None, cleanups: CleanupStack | None = None,
-        isolated: Collection[str] = (),
-    ) -> None:  # fmt: skip
+    def __init__(self, system: System, heartbeat: Heartbeat, cleanups: CleanupStack, isolated: Collection[str]) -> None:
         self.ends: dict[str, StepEnd] = {}
         self._begun: dict[str, tuple[float, State]] = {}
         super().__init__(system, heartbeat, cleanups, isolated)

@@ -9,8 +9,7 @@ import numpy as np
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.exceptions import UnitFailure
-from handover.cosim.fmu.calls import State
-from handover.cosim.stepping.ensemble import Ensemble
+from handover.cosim.stepping.ensemble import Ensemble, SavedStates
 from handover.cosim.stepping.interface import Interface, Magnitudes
 from handover.cosim.stepping.solvers import InterfaceSolver, Unsolved
 from handover.cosim.system.schedule import Slot
@@ -147,7 +146,7 @@ class IteratedStep:
         with self._ensemble.saved([s.unit for s in slots]) as states:
             self._iterate(t, slots, states)
 
-    def _iterate(self, t: float, slots: Sequence[Slot], states: "dict[str, State]") -> None:
+    def _iterate(self, t: float, slots: Sequence[Slot], states: SavedStates) -> None:
         spent = {s.unit: 0.0 for s in slots}
         rollbacks = -1
 
