@@ -22,11 +22,10 @@ from handover.cosim.master.unit_options import unasked_isolations
 from handover.cosim.master.watchdog import Watchdog
 from handover.cosim.plan.plan_stepper import PlanStepper
 from handover.cosim.record.recorder import Recorder
-from handover.cosim.stepping.adaptive_stepper import AdaptiveStepper
+from handover.cosim.stepping.adaptive_stepper import AdaptiveStepper, StepStatistics
 from handover.cosim.stepping.ensemble import CleanupStack, Ensemble
 from handover.cosim.stepping.iteration import IterationCount
 from handover.cosim.stepping.options import MasterOptions
-from handover.cosim.stepping.step_control import StepStatistics
 from handover.cosim.stepping.stepper import Coupling, Stepper
 from handover.cosim.system.signals import ObserveAfter, Observer, Signals
 from handover.cosim.system.system import System

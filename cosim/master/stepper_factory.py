@@ -1,11 +1,14 @@
 """Chooses how a system is stepped, by its options and its units: with which ensemble, coupling and stepper."""
 
-from collections.abc import Sequence
+import logging
+from collections.abc import Iterable, Sequence
 from fractions import Fraction
 
 from handover.cosim.fmu.heartbeat import Heartbeat
 from handover.cosim.master.unit_options import isolated_units, tolerances_of
-from handover.cosim.plan.choice import log_fallback, plan_obstacle, plan_stepper
+from handover.cosim.plan.memory import loop
+from handover.cosim.plan.plan_maker import PlanMaker
+from handover.cosim.plan.plan_stepper import PlanStepper
 from handover.cosim.stepping.adaptive_stepper import AdaptiveStepper, check_control, fine_tick
 from handover.cosim.stepping.ensemble import CleanupStack, Ensemble
 from handover.cosim.stepping.event_ensemble import EventEnsemble
@@ -16,8 +19,14 @@ from handover.cosim.stepping.options import Algorithm, Extrapolation, MasterOpti
 from handover.cosim.stepping.solvers import InterfaceSolver
 from handover.cosim.stepping.stepper import Coupling, GridStepper, Stepper
 from handover.cosim.system.loops import Group, check_cycles, check_loops, groups_of_data_flow
+from handover.cosim.system.port_names import PortName
 from handover.cosim.system.schedule import Schedule
 from handover.cosim.system.system import System
+
+_log = logging.getLogger(__name__)
+
+_MAX_TICKS = 2**63
+"""Numbers of a time grid must be below this for a plan: its loop has 64 bits for them."""
 
 
 class StepperFactory:
@@ -55,8 +64,28 @@ class StepperFactory:
 
     @property
     def plan_obstacle(self) -> str | None:
-        """Why the system does not run as a compiled plan; None if it does."""
-        return plan_obstacle(self.schedule, self._system, self._options, iterates=self.iterates)
+        """Why the system cannot run as a compiled plan; None if it can.
+
+        What the plan does not support has to be an obstacle here: the two paths give the same bytes.
+        """
+        system, options, schedule = self._system, self._options, self.schedule
+        if not options.compiled:
+            return "the options ask for none"
+        if options.adaptive is not None or self.has_events:
+            return "steps may end anywhere"
+        if not options.algorithm.coupling.traits.in_plan:
+            return f"the coupling is {options.algorithm.value}"
+        if self.iterates:
+            return "units make a loop"
+        if options.extrapolation is not Extrapolation.HOLD:
+            return "inputs are extrapolated"
+        if system.followed:
+            return f"inputs follow values over time: {_named(system.followed)}"
+        if system.externals:
+            return f"inputs come from outside: {_named(system.externals)}"
+        if max(abs(number) for number in schedule.grid) >= _MAX_TICKS:
+            return f"a tick of {schedule.tick} s is too long a fraction, from {schedule.start} s on"
+        return None
 
     def load(self, heartbeat: Heartbeat, cleanups: CleanupStack) -> Ensemble:
         """Load the units; the caller closes `cleanups`, also if this fails."""
@@ -87,10 +116,11 @@ class StepperFactory:
         control = self._options.adaptive
         if self._options.cpu_times:
             ensemble.measure_cpu()
-        if (obstacle := self.plan_obstacle) is not None:
-            log_fallback(obstacle)
-        elif plan := plan_stepper(self.schedule, ensemble, coupling, self._options):
-            return plan
+        obstacle, parallel = self.plan_obstacle, coupling.traits.parallel
+        if obstacle is None and (library := loop()) is not None:
+            plan = PlanMaker(ensemble, self.schedule, library, parallel=parallel, clock=self._options.cpu_times)
+            return PlanStepper(self.schedule, ensemble, coupling, plan)
+        _log.info("no compiled plan: %s", obstacle or "its library is not compiled for this machine")
         if isinstance(ensemble, EventEnsemble):
             return EventStepper(self.schedule, ensemble, coupling)
         if self._options.extrapolation is Extrapolation.LINEAR:
@@ -110,3 +140,7 @@ class StepperFactory:
     def _solver(self, interface: Interface) -> InterfaceSolver:
         solver = self._options.algorithm.coupling.traits.solver
         return solver(interface.magnitudes(self._options.tolerance), self._options.max_iterations)
+
+
+def _named(ends: Iterable[PortName]) -> str:
+    return ", ".join(str(end) for end in ends)

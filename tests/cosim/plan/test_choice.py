@@ -9,10 +9,11 @@ from pathlib import Path
 import pytest
 from support.cosim.native_units import native_fmu
 
+from handover.cosim.master import stepper_factory
 from handover.cosim.master.master import Master
 from handover.cosim.native_libraries import TARGETS, CompilationError, NativeLibraries, host_platform, zig_cc
-from handover.cosim.plan import choice, memory
 from handover.cosim.plan import compile as plan_compile
+from handover.cosim.plan import memory
 from handover.cosim.plan.compile import FOLDER, SOURCES, plan_library
 from handover.cosim.plan.plan_stepper import PlanStepper
 from handover.cosim.stepping.options import Algorithm, Extrapolation, MasterOptions
@@ -48,10 +49,11 @@ def logged(caplog: pytest.LogCaptureFixture) -> Callable[[System, MasterOptions]
     """Runs a system for a while; returns what the plan logged: nothing where there is one."""
 
     def run(system: System, options: MasterOptions) -> list[str]:
-        with caplog.at_level(logging.INFO, "handover.cosim.plan"), Master(system, options) as master:
-            assert isinstance(master.stepper, GridStepper if caplog.records else PlanStepper)
+        with caplog.at_level(logging.INFO, "handover.cosim"), Master(system, options) as master:
+            lines = [text for r in caplog.records if "plan" in (text := r.getMessage())]
+            assert isinstance(master.stepper, GridStepper if lines else PlanStepper)
             master.run(Fraction(1, 5))
-        return [r.getMessage() for r in caplog.records]
+        return lines
 
     return run
 
@@ -78,7 +80,7 @@ def test_a_plain_system_is_compiled_and_where_it_is_not_it_says_why(
 
 
 def test_without_its_library(monkeypatch: pytest.MonkeyPatch, logged: Callable[..., list[str]]):
-    monkeypatch.setattr(choice, "loop", lambda: None)
+    monkeypatch.setattr(stepper_factory, "loop", lambda: None)
     assert logged(build(), MasterOptions()) == ["no compiled plan: its library is not compiled for this machine"]
 
 

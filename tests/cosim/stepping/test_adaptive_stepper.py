@@ -8,9 +8,8 @@ from support.cosim.native_units import native_fmu
 from support.cosim.oscillator import PLAIN, STATES, STIFF
 
 from handover.cosim.master.master import Master
-from handover.cosim.stepping.adaptive_stepper import AdaptiveStepper, StepTooSmall
+from handover.cosim.stepping.adaptive_stepper import AdaptiveStepper, PiController, StepStatistics, StepTooSmall
 from handover.cosim.stepping.options import AdaptiveStep, Algorithm, Extrapolation, MasterOptions
-from handover.cosim.stepping.step_control import PiController, StepStatistics
 from handover.cosim.system.system import System
 
 H = Fraction(1, 100)
