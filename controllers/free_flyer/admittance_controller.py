@@ -2,15 +2,15 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from handover.controllers.free_flyer import impedance_controller, ports
 from handover.controllers.free_flyer.body import InvalidControllerParameters, stability_faults
+from handover.controllers.free_flyer.flyer_controller import GripperController, LimitParams
 from handover.controllers.free_flyer.gains import PidGains
-from handover.controllers.free_flyer.ports import PERIOD, TERMINALS, Behaviour, Inputs, unit_quaternion
+from handover.controllers.free_flyer.ports import Behaviour, Inputs, unit_quaternion
 from handover.controllers.free_flyer.sampled_loop import LinearController, SampledLoop
 from handover.controllers.free_flyer.virtual_body import VirtualBody, admittance_law
 from handover.controllers.free_flyer.wrench_observer import ThrustModel, WrenchObserver
@@ -37,7 +37,6 @@ from handover.cosim.blocks.plain_rotation import (
 )
 from handover.cosim.blocks.ports import Floats, Vector3, output, parameter
 from handover.cosim.blocks.state import pack_state, unpack_state
-from handover.cosim.blocks.terminals import Terminal
 from handover.cosim.blocks.units import Newton, NewtonMetre, Number, PerSecond, PerSecond2
 
 __all__ = ["AdmittanceController", "Behaviour", "Inputs", "InvalidControllerParameters", "Outputs", "Params"]
@@ -46,7 +45,7 @@ _NAME = "AdmittanceController"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Params(impedance_controller.Params):
+class Params(impedance_controller.Params, LimitParams):
     """Stiffness and damping as of the impedance control, [Fernandes2020] table 4.1; what is added is assumed.
 
     The inner gains track a step of the virtual body's force in about half a second, and leave two thirds of the weakest
@@ -66,12 +65,6 @@ class Params(impedance_controller.Params):
     )
     k_w: PerSecond = parameter(
         8.0, "inner loop: angular acceleration per rate error (assumed)", minimum=0.0, maximum=1e4
-    )
-    f_max: Vector3[Newton] = parameter(
-        np.array([0.55, 0.39, 0.45]), "largest force, along the axes of B", minimum=0.0, maximum=1e4
-    )
-    tau_max: Vector3[NewtonMetre] = parameter(
-        np.array([0.064, 0.040, 0.075]), "largest torque, about the axes of B", minimum=0.0, maximum=1e4
     )
 
     def inner_gains(self, factor: float = 1.0) -> tuple[PidGains, PidGains]:
@@ -107,7 +100,7 @@ class Outputs(ports.Outputs):
     tau_G_est: Vector3[NewtonMetre] = output("estimated external torque about the gripper, in the world")
 
 
-class AdmittanceController:
+class AdmittanceController(GripperController[Inputs, Outputs]):
     """Moves a virtual mass on a spring and a damper by the wrench on the gripper, and lets the robot follow it.
 
     - The wrench is estimated (`WrenchObserver`) from the navigation's velocities and the controller's own commands,
@@ -141,9 +134,6 @@ class AdmittanceController:
         "f_G_est": ("v_WB_meas", "active"),
         "tau_G_est": ("q_WB_meas", "v_WB_meas", "w_WB_meas", "active"),
     }
-    terminals: ClassVar[tuple[Terminal, ...]] = TERMINALS
-    period: ClassVar[Fraction] = PERIOD
-    deferred: ClassVar[tuple[str, ...]] = ("control", "threadpoolctl")
 
     def __init__(self, params: Params) -> None:
         self._T = float(self.period)
@@ -159,13 +149,6 @@ class AdmittanceController:
         self._mass, self._I_B, self._p_BG = params.mass, row_major(params.I_B), vector(params.p_BG)
         self._limit = np.concatenate([params.f_max, params.tau_max])
         self._reset()
-
-    def outputs(self, t: float, u: Inputs) -> Outputs:
-        """Return the command that a step would give; no time passes."""
-        before = self.get_state()
-        y = self.step(t, self._T, u)
-        self.set_state(before)
-        return y
 
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Return the command for the measurements of t, which holds until t + dt."""

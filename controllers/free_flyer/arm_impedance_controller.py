@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from fractions import Fraction
 from typing import ClassVar
 
 import numpy as np
@@ -10,24 +9,21 @@ import numpy as np
 from handover.controllers.free_flyer.arm_impedance import ArmAtRest, NullMotion
 from handover.controllers.free_flyer.arm_model import ArmModel, Chain, OperationalSpace, mass_matrix
 from handover.controllers.free_flyer.body import InvalidControllerParameters, stability_faults
+from handover.controllers.free_flyer.flyer_controller import GainParams, GripperController
 from handover.controllers.free_flyer.gains import ImpedanceGains, published_gains
-from handover.controllers.free_flyer.ports import ARM, INERTIA, MASS, PERIOD, TERMINALS, Behaviour, unit_quaternion
+from handover.controllers.free_flyer.ports import ARM, INERTIA, MASS, Behaviour, unit_quaternion
 from handover.controllers.free_flyer.ports import Inputs as BaseInputs
 from handover.controllers.free_flyer.ports import Outputs as BaseOutputs
 from handover.controllers.free_flyer.sampled_loop import SampledLoop
 from handover.cosim.blocks.geometry import quaternion_of, rotation_of
 from handover.cosim.blocks.plain_rotation import quaternion, rotation_vector
 from handover.cosim.blocks.ports import Floats, Matrix3, Vector3, output, parameter, port
-from handover.cosim.blocks.terminals import Terminal
 from handover.cosim.blocks.units import (
     Kilogram,
     KilogramMetre2,
     Metre,
     NewtonMetre,
-    NewtonMetrePerRadian,
     NewtonMetreSecondPerRadian,
-    NewtonPerMetre,
-    NewtonSecondPerMetre,
     Number,
     Radian,
     RadianPerSecond,
@@ -38,7 +34,7 @@ _NAME = "ArmImpedanceController"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Params:
+class Params(GainParams):
     """Gains of table 4.1 or custom ones, and what the robot knows of itself: NASA's values of Astrobee and its arm.
 
     The arm's second link is the distal one with the gripper; a third joint, where the gripper is, where the links'
@@ -50,15 +46,6 @@ class Params:
     )
     rotational_damping: NewtonMetreSecondPerRadian = parameter(
         1.0, "rotational k_B unless CUSTOM: table 4.1's 5 of RIGID is unstable with light links", minimum=0.0
-    )
-    stiffness_translation: Matrix3[NewtonPerMetre] = parameter(
-        7.0 * MASS * np.eye(3), "CUSTOM: linear k_D, in the goal's axes"
-    )
-    damping_translation: Matrix3[NewtonSecondPerMetre] = parameter(
-        15.0 * np.eye(3), "CUSTOM: linear k_B, in the goal's axes"
-    )
-    stiffness_rotation: Matrix3[NewtonMetrePerRadian] = parameter(
-        70.0 * INERTIA, "CUSTOM: rotational k_D, in the goal's axes"
     )
     damping_rotation: Matrix3[NewtonMetreSecondPerRadian] = parameter(
         np.eye(3), "CUSTOM: rotational k_B, in the goal's axes"
@@ -115,12 +102,7 @@ class Params:
     def gains(self) -> ImpedanceGains:
         """Return the gains of the behaviour: m and H of table 4.1 are the whole robot's in its posture, in G's axes."""
         if self.behaviour is Behaviour.CUSTOM:
-            return ImpedanceGains(
-                stiffness_translation=self.stiffness_translation,
-                damping_translation=self.damping_translation,
-                stiffness_rotation=self.stiffness_rotation,
-                damping_rotation=self.damping_rotation,
-            )
+            return self.custom_gains()
         model = self.model()
         whole, R_BG = model.whole(self.posture), Chain(model, np.eye(3), np.zeros(3), self.posture).R[-1]
         seen: Floats = np.transpose(R_BG) @ whole.I_B @ R_BG
@@ -147,7 +129,7 @@ class Outputs(BaseOutputs):
     tau_J_cmd: Vector3[NewtonMetre] = output("commanded torques on the joints")
 
 
-class ArmImpedanceController:
+class ArmImpedanceController(GripperController[Inputs, Outputs]):
     """u = J^T (-k_B x' + k_D x~) + B Z (w_0^2 q~ - 2 zeta w_0 q_n'): eq. (3.25) with joints that move.
 
     x~ and x' are those of `ImpedanceController`, in the goal's axes. J is (6, 6 + n), so that n motions
@@ -176,9 +158,6 @@ class ArmImpedanceController:
         "error_p": ("p_WB_meas", "q_WB_meas", "q_J", "p_WG_goal"),
         "error_R": ("q_WB_meas", "q_J", "q_WG_goal"),
     }
-    terminals: ClassVar[tuple[Terminal, ...]] = TERMINALS
-    period: ClassVar[Fraction] = PERIOD
-    deferred: ClassVar[tuple[str, ...]] = ("control", "threadpoolctl")
 
     def __init__(self, params: Params) -> None:
         model, period = params.model(), float(self.period)
@@ -198,22 +177,8 @@ class ArmImpedanceController:
         self._loop_figures = loop.figures
         self._model, self._gains, self._null, self._posture = model, gains, null, params.posture
 
-    def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
-        """Return the command for the measurements; the law has no memory."""
-        return self._command(u)
-
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Return the command for the measurements of t, which holds until t + dt."""
-        return self._command(u)
-
-    def get_state(self) -> bytes:
-        """Return nothing: there is no state."""
-        return b""
-
-    def set_state(self, state: bytes) -> None:
-        """Do nothing: there is no state."""
-
-    def _command(self, u: Inputs) -> Outputs:
         n = self._model.joints
         R_WB = rotation_of(np.array(unit_quaternion(u.q_WB_meas, _NAME, "q_WB_meas")))
         R_WD = rotation_of(np.array(unit_quaternion(u.q_WG_goal, _NAME, "q_WG_goal")))

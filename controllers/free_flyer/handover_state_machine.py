@@ -3,11 +3,11 @@
 import math
 from collections.abc import Mapping
 from dataclasses import fields
-from fractions import Fraction
 from typing import ClassVar
 
 import numpy as np
 
+from handover.controllers.free_flyer.flyer_controller import SampledController
 from handover.controllers.free_flyer.handover_parameters import (
     NAME,
     HandoverTask,
@@ -15,7 +15,7 @@ from handover.controllers.free_flyer.handover_parameters import (
     Params,
 )
 from handover.controllers.free_flyer.handover_ports import HandoverPhase, Inputs, Outputs
-from handover.controllers.free_flyer.ports import PERIOD, unit_quaternion
+from handover.controllers.free_flyer.ports import unit_quaternion
 from handover.controllers.free_flyer.velocity_monitor import PullMonitor, VelocityMonitor
 from handover.cosim.blocks.plain_rotation import (
     Quaternion,
@@ -48,7 +48,7 @@ Pose = tuple[Vector, Quaternion]
 """Position, m, and orientation of a gripper, in W."""
 
 
-class HandoverStateMachine:
+class HandoverStateMachine(SampledController[Inputs, Outputs]):
     """Runs a handover through the states of figure 3.1.
 
     - Robot to human, figure 3.2: OPEN_GRIPPER, MOVE_TO_OBJECT (at the end straight ahead, for what is touched floats
@@ -97,7 +97,6 @@ class HandoverStateMachine:
         terminal("estimate", TerminalKind.MOTION, "p_WB_meas", "q_WB_meas", "v_WB_meas", "w_WB_meas"),
         terminal("goal", TerminalKind.POSE, "p_WG_goal", "q_WG_goal"),
     )
-    period: ClassVar[Fraction] = PERIOD
 
     def __init__(self, params: Params) -> None:
         params.check()
@@ -141,13 +140,6 @@ class HandoverStateMachine:
             HandoverPhase.DEACTIVATE_IMPEDANCE: self._deactivate_impedance,
             HandoverPhase.RETREAT: self._retreat_from_handover,
         }
-
-    def outputs(self, t: float, u: Inputs) -> Outputs:
-        """Return what a step would give; nothing is decided."""
-        before = self.get_state()
-        y = self.step(t, self._T, u)
-        self.set_state(before)
-        return y
 
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Measure, decide, and return the commands that hold until t + dt; at most one transition."""

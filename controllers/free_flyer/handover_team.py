@@ -2,12 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from fractions import Fraction
 from typing import Any, ClassVar
 
 import numpy as np
 
 from handover.controllers.free_flyer import handover_parameters
+from handover.controllers.free_flyer.flyer_controller import SampledController
 from handover.controllers.free_flyer.handover_state_machine import (
     HandoverPhase,
     HandoverStateMachine,
@@ -17,7 +17,7 @@ from handover.controllers.free_flyer.handover_state_machine import (
 )
 from handover.controllers.free_flyer.handover_state_machine import Inputs as RobotInputs
 from handover.controllers.free_flyer.handover_state_machine import Outputs as RobotOutputs
-from handover.controllers.free_flyer.ports import PERIOD, unit_quaternion
+from handover.controllers.free_flyer.ports import unit_quaternion
 from handover.controllers.free_flyer.velocity_monitor import VelocityMonitor
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.plain_rotation import (
@@ -166,7 +166,7 @@ class Outputs:
     speed_2: MetrePerSecond = output("speed, low-passed, by which the second robot is moved by a person", minimum=0.0)
 
 
-class HandoverTeam:
+class HandoverTeam(SampledController[Inputs, Outputs]):
     """Runs a handover by two robots that hold one object, by the rules of `HandoverStateMachine`.
 
     - Together: one machine for both, whose gripper is the middle between theirs. Its goals are those of the middle,
@@ -198,7 +198,6 @@ class HandoverTeam:
             terminal(f"goal_{r}", TerminalKind.POSE, **{f"{x}_WG_goal": f"{x}_WG_goal_{r}" for x in "pq"}),
         )
     )
-    period: ClassVar[Fraction] = PERIOD
 
     def __init__(self, params: Params) -> None:
         params.check()
@@ -206,13 +205,6 @@ class HandoverTeam:
         self._p_BG = vector(params.p_BG)
         self._middle = _MiddleMachine(params, self._T) if params.together else None
         self._robots = [] if params.together else [_YieldingMachine(params.of_robot(i)) for i in (0, 1)]
-
-    def outputs(self, t: float, u: Inputs) -> Outputs:
-        """Return what a step would give; nothing is decided."""
-        before = self.get_state()
-        y = self.step(t, self._T, u)
-        self.set_state(before)
-        return y
 
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:
         """Measure, decide, and return the commands that hold until t + dt; at most one transition."""

@@ -1,20 +1,13 @@
 """Impedance control of a free-flyer's gripper, as a spring and a damper. [Fernandes2020] sec. 3.3.3 and 4.1.2."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from fractions import Fraction
-from typing import ClassVar
 
 import numpy as np
 
-from handover.controllers.free_flyer.body import FlyerBody, InvalidControllerParameters, stability_faults
+from handover.controllers.free_flyer.body import InvalidControllerParameters, stability_faults
+from handover.controllers.free_flyer.flyer_controller import GainParams, GripperController, RobotParams
 from handover.controllers.free_flyer.gains import ImpedanceGains, published_gains
 from handover.controllers.free_flyer.ports import (
-    ARM,
-    INERTIA,
-    MASS,
-    PERIOD,
-    TERMINALS,
     Behaviour,
     Inputs,
     Outputs,
@@ -36,18 +29,6 @@ from handover.cosim.blocks.plain_rotation import (
     subtract,
     vector,
 )
-from handover.cosim.blocks.ports import Matrix3, Vector3, parameter
-from handover.cosim.blocks.terminals import Terminal
-from handover.cosim.blocks.units import (
-    Kilogram,
-    KilogramMetre2,
-    Metre,
-    NewtonMetrePerRadian,
-    NewtonMetreSecondPerRadian,
-    NewtonPerMetre,
-    NewtonSecondPerMetre,
-    Second,
-)
 
 __all__ = ["Behaviour", "ImpedanceController", "Inputs", "InvalidControllerParameters", "Outputs", "Params"]
 
@@ -55,49 +36,17 @@ _NAME = "ImpedanceController"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Params:
+class Params(RobotParams, GainParams):
     """Gains of table 4.1 or custom ones, and what the robot knows of itself: public values of Astrobee, arm assumed."""
-
-    behaviour: Behaviour = parameter(
-        Behaviour.RIGID, "gains of [Fernandes2020] table 4.1, or CUSTOM for the four matrices below"
-    )
-    stiffness_translation: Matrix3[NewtonPerMetre] = parameter(
-        7.0 * MASS * np.eye(3), "CUSTOM: linear k_D, in the goal's axes"
-    )
-    damping_translation: Matrix3[NewtonSecondPerMetre] = parameter(
-        15.0 * np.eye(3), "CUSTOM: linear k_B, in the goal's axes"
-    )
-    stiffness_rotation: Matrix3[NewtonMetrePerRadian] = parameter(
-        70.0 * INERTIA, "CUSTOM: rotational k_D, in the goal's axes"
-    )
-    damping_rotation: Matrix3[NewtonMetreSecondPerRadian] = parameter(
-        5.0 * np.eye(3), "CUSTOM: rotational k_B, in the goal's axes"
-    )
-    mass: Kilogram = parameter(MASS, "mass of the robot", minimum=0.0, maximum=1e4)
-    I_B: Matrix3[KilogramMetre2] = parameter(INERTIA, "inertia about the centre of mass, in B")
-    p_BG: Vector3[Metre] = parameter(ARM, "gripper, seen from the centre of mass (assumed)", minimum=-5.0, maximum=5.0)
-    delay: Second = parameter(
-        0.0, "expected time from a measurement to its command's arrival at the propulsion", minimum=0.0, maximum=0.2
-    )
-    lag: Second = parameter(0.02, "expected time constant of the propulsion (assumed)", minimum=0.0, maximum=2.0)
-
-    def body(self) -> FlyerBody:
-        """Return the robot's model of itself."""
-        return FlyerBody(mass=self.mass, I_B=self.I_B, p_BG=self.p_BG)
 
     def gains(self) -> ImpedanceGains:
         """Return the gains of the behaviour."""
         if self.behaviour is not Behaviour.CUSTOM:
             return published_gains(self.behaviour, self.body())
-        return ImpedanceGains(
-            stiffness_translation=self.stiffness_translation,
-            damping_translation=self.damping_translation,
-            stiffness_rotation=self.stiffness_rotation,
-            damping_rotation=self.damping_rotation,
-        )
+        return self.custom_gains()
 
 
-class ImpedanceController:
+class ImpedanceController(GripperController[Inputs, Outputs]):
     """u = J^T (-k_B x' + k_D x~), eq. (3.25), with x~ = x_d - x and x_d' = 0: no force sensor is needed.
 
     x is the gripper's pose. Its error is p_WG_goal - p_WG and, in place of differences of Euler angles, the rotation
@@ -117,16 +66,6 @@ class ImpedanceController:
         InvalidOrientation: a quaternion is zero or not finite.
     """
 
-    feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {
-        "f_cmd": ("p_WB_meas", "q_WB_meas", "v_WB_meas", "w_WB_meas", "p_WG_goal", "q_WG_goal", "active"),
-        "tau_cmd": ("p_WB_meas", "q_WB_meas", "v_WB_meas", "w_WB_meas", "p_WG_goal", "q_WG_goal", "active"),
-        "error_p": ("p_WB_meas", "q_WB_meas", "p_WG_goal"),
-        "error_R": ("q_WB_meas", "q_WG_goal"),
-    }
-    terminals: ClassVar[tuple[Terminal, ...]] = TERMINALS
-    period: ClassVar[Fraction] = PERIOD
-    deferred: ClassVar[tuple[str, ...]] = ("control", "threadpoolctl")
-
     def __init__(self, params: Params) -> None:
         body, gains, period = params.body(), params.gains(), float(self.period)
         faults = body.faults() + (gains.faults() if params.behaviour is Behaviour.CUSTOM else [])
@@ -141,22 +80,8 @@ class ImpedanceController:
         self._k, self._d = row_major(gains.stiffness_translation), row_major(gains.damping_translation)
         self._k_R, self._d_R = row_major(gains.stiffness_rotation), row_major(gains.damping_rotation)
 
-    def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
-        """Return the command for the measurements; the law has no memory."""
-        return self._command(u)
-
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Return the command for the measurements of t, which holds until t + dt."""
-        return self._command(u)
-
-    def get_state(self) -> bytes:
-        """Return nothing: there is no state."""
-        return b""
-
-    def set_state(self, state: bytes) -> None:
-        """Do nothing: there is no state."""
-
-    def _command(self, u: Inputs) -> Outputs:
         q_WD = unit_quaternion(u.q_WG_goal, _NAME, "q_WG_goal")
         q_WB = unit_quaternion(u.q_WB_meas, _NAME, "q_WB_meas")
         r = rotate(rotation_matrix(q_WB), self._p_BG)

@@ -1,20 +1,13 @@
 """Pose control of a free-flyer's gripper, by a PID along a trajectory. [Fernandes2020] sec. 3.1.1 and 4.1.2."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from fractions import Fraction
-from typing import ClassVar
 
 import numpy as np
 
-from handover.controllers.free_flyer.body import FlyerBody, InvalidControllerParameters, stability_faults
+from handover.controllers.free_flyer.body import InvalidControllerParameters, stability_faults
+from handover.controllers.free_flyer.flyer_controller import GripperController, LimitParams, RobotParams
 from handover.controllers.free_flyer.gains import PidGains, pid_law
 from handover.controllers.free_flyer.ports import (
-    ARM,
-    INERTIA,
-    MASS,
-    PERIOD,
-    TERMINALS,
     Inputs,
     Outputs,
     unit_quaternion,
@@ -43,23 +36,16 @@ from handover.cosim.blocks.plain_rotation import (
     subtract,
     vector,
 )
-from handover.cosim.blocks.ports import Matrix3, Vector3, parameter
+from handover.cosim.blocks.ports import parameter
 from handover.cosim.blocks.state import pack_state, unpack_state
-from handover.cosim.blocks.terminals import Terminal
 from handover.cosim.blocks.units import (
-    Kilogram,
-    KilogramMetre2,
-    Metre,
     MetrePerSecond,
     MetrePerSecond2,
-    Newton,
-    NewtonMetre,
     PerSecond,
     PerSecond2,
     PerSecond3,
     RadianPerSecond,
     RadianPerSecond2,
-    Second,
 )
 
 __all__ = ["Inputs", "InvalidControllerParameters", "Outputs", "Params", "PoseController"]
@@ -68,7 +54,7 @@ _NAME = "PoseController"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Params:
+class Params(RobotParams, LimitParams):
     """Gains of Astrobee's public software; the trajectory's bounds leave half of the weakest thrust for control."""
 
     k_P: PerSecond2 = parameter(0.6, "acceleration per position error", minimum=0.0, maximum=1e4)
@@ -87,23 +73,6 @@ class Params:
     turning: RadianPerSecond2 = parameter(
         0.1, "largest angular acceleration of the trajectory (assumed)", minimum=1e-4, maximum=100.0
     )
-    f_max: Vector3[Newton] = parameter(
-        np.array([0.55, 0.39, 0.45]), "largest force, along the axes of B", minimum=0.0, maximum=1e4
-    )
-    tau_max: Vector3[NewtonMetre] = parameter(
-        np.array([0.064, 0.040, 0.075]), "largest torque, about the axes of B", minimum=0.0, maximum=1e4
-    )
-    mass: Kilogram = parameter(MASS, "mass of the robot", minimum=0.0, maximum=1e4)
-    I_B: Matrix3[KilogramMetre2] = parameter(INERTIA, "inertia about the centre of mass, in B")
-    p_BG: Vector3[Metre] = parameter(ARM, "gripper, seen from the centre of mass (assumed)", minimum=-5.0, maximum=5.0)
-    delay: Second = parameter(
-        0.0, "expected time from a measurement to its command's arrival at the propulsion", minimum=0.0, maximum=0.2
-    )
-    lag: Second = parameter(0.02, "expected time constant of the propulsion (assumed)", minimum=0.0, maximum=2.0)
-
-    def body(self) -> FlyerBody:
-        """Return the robot's model of itself."""
-        return FlyerBody(mass=self.mass, I_B=self.I_B, p_BG=self.p_BG)
 
     def position_gains(self) -> PidGains:
         """Return the gains of the translation."""
@@ -135,7 +104,7 @@ class Params:
         return faults
 
 
-class PoseController:
+class PoseController(GripperController[Inputs, Outputs]):
     """Takes the gripper to a pose by a PID of the base along a planned trajectory, as Astrobee's mobility does.
 
     When it becomes active, and whenever the goal changes, a trajectory (`Profile`) begins where the base is, with its
@@ -156,16 +125,6 @@ class PoseController:
             that is not stable.
         InvalidOrientation: a quaternion is zero or not finite.
     """
-
-    feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {
-        "f_cmd": ("p_WB_meas", "q_WB_meas", "v_WB_meas", "w_WB_meas", "p_WG_goal", "q_WG_goal", "active"),
-        "tau_cmd": ("p_WB_meas", "q_WB_meas", "v_WB_meas", "w_WB_meas", "p_WG_goal", "q_WG_goal", "active"),
-        "error_p": ("p_WB_meas", "q_WB_meas", "p_WG_goal"),
-        "error_R": ("q_WB_meas", "q_WG_goal"),
-    }
-    terminals: ClassVar[tuple[Terminal, ...]] = TERMINALS
-    period: ClassVar[Fraction] = PERIOD
-    deferred: ClassVar[tuple[str, ...]] = ("control", "threadpoolctl")
 
     def __init__(self, params: Params) -> None:
         body, self._T = params.body(), float(self.period)
@@ -190,13 +149,6 @@ class PoseController:
             speed=params.speed, acceleration=params.acceleration, rate=params.rate, turning=params.turning
         )
         self._reset()
-
-    def outputs(self, t: float, u: Inputs) -> Outputs:
-        """Return the command that a step would give; the trajectory does not begin."""
-        before = self.get_state()
-        y = self.step(t, self._T, u)
-        self.set_state(before)
-        return y
 
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Return the command for the measurements of t, which holds until t + dt."""
