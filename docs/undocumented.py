@@ -8,12 +8,13 @@ from collections.abc import Iterable, Iterator, Mapping
 
 import click
 from gallery import MetricRow
+from loaded_commands import loaded
 
 import handover
 from handover.cosim.blocks.description import describe
 from handover.fmus.catalog import UNITS, import_class
 from handover.scenarios.catalog import SCENARIOS
-from handover.scenarios.cli.command import DeferredCommand, main
+from handover.scenarios.cli.command import main
 
 
 class Undocumented(ValueError):
@@ -36,13 +37,12 @@ def undocumented_metrics(metrics: Mapping[str, Iterable[MetricRow]]) -> list[str
 
 def commands() -> Iterator[tuple[str, click.Command]]:
     """Return all commands with their names, `handover` itself as ""."""
-    waiting: list[tuple[str, click.Command]] = [("", main)]
+    waiting: list[tuple[str, click.Command]] = [("", loaded(main))]
     while waiting:
         name, command = waiting.pop(0)
         yield name, command
         for child, found in sorted(getattr(command, "commands", {}).items()):
-            loaded = found.load() if isinstance(found, DeferredCommand) else found
-            waiting.append((f"{name} {child}".strip(), loaded))
+            waiting.append((f"{name} {child}".strip(), found))
 
 
 def _public_names() -> Iterator[str]:
