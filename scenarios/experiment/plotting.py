@@ -14,6 +14,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure as Canvas
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.transforms import ScaledTranslation
 
 from handover.cosim.blocks.ports import Floats
@@ -290,4 +291,22 @@ def _save(canvas: Canvas, path: Path, formats: Sequence[str]) -> None:
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", "Glyph")  # it has a name's letter raw
             canvas.savefig(file, metadata=metadata)
+            if _made_room(canvas):
+                canvas.savefig(file, metadata=metadata)
         canvas.set_layout_engine("none")  # the layout stays: computing it costs as much as drawing
+
+
+def _made_room(canvas: Canvas) -> bool:
+    """Make room for labels of vertical axes that reached out on the left as a figure was saved; return whether any did.
+
+    They do where the lowest tick is at the very end of an axis: matplotlib's layout has overlooked it.
+    """
+    engine = canvas.get_layout_engine()
+    if not isinstance(engine, ConstrainedLayoutEngine):
+        return False
+    labels = [axes.yaxis.label for axes in canvas.axes if axes.get_visible() and axes.get_ylabel()]
+    beyond = max((-label.get_window_extent().x0 for label in labels), default=0.0)
+    share = 1.5 * beyond / (canvas.get_figwidth() * mpl.rcParams["savefig.dpi"])
+    if share > 0.0:
+        engine.set(rect=(share, 0.0, 1.0 - share, 1.0))
+    return share > 0.0

@@ -5,6 +5,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
@@ -130,3 +131,12 @@ def test_page_and_figure_draw_the_same_curves_in_the_same_colours(
         assert [label for label, _ in drawn[title]] == [label for label, _ in on_page]
         curves = drawn[title][: len(plot.curves)]
         assert [f"var(--c{COLOURS.index(colour)})" for _, colour in curves] == [c for _, c in on_page[: len(curves)]]
+
+
+def test_labels_of_axes_are_whole_where_the_lowest_tick_is_at_an_axis_end(runs: Runs, tmp_path: Path):
+    """Of the base's displacement, whose axis ends 0.1 mm below its tick at -10 mm."""
+    done = runs["flyer_arm_impedance"]
+    (figure,) = (f for f in done.experiment.time_figures(done.parameters, done.record) if f.name == "yielding")
+    draw_time_figures([figure], done.record.time, tmp_path)
+    picture = np.asarray(cv2.imread(str(tmp_path / "yielding.png")))
+    assert picture[:, :3].min() > 200

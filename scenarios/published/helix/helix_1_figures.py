@@ -38,7 +38,7 @@ def draw_times(arms: Sequence[Helix1Runs], folder: Path) -> list[Figure]:
             axis.grid(axis="x", visible=False)
             axis.set_title(arm.title.replace(", ", ",\n"))
         axes[0].set_ylabel("time until the gripper begins to close (s)")
-        axes[0].figure.legend(handles=_times_legend(), loc="outside lower center", ncols=2)
+        axes[0].figure.legend(handles=_times_legend(), loc="outside lower center", ncols=min(len(arms), 2))
     caption = (
         "Time until the gripper begins to close, by step size, on a logarithmic axis: where the time halves as the "
         "step doubles, columns are equally far apart. Runs in which it never began to close are not there."

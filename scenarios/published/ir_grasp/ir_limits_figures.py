@@ -30,8 +30,8 @@ def draw_limits(runs: LimitRuns, folder: Path) -> list[Figure]:
 
 
 def _rates(runs: LimitRuns, shown: Sequence[Axis], folder: Path) -> Figure:
-    rows = ceil(len(shown) / _COLUMNS)
-    with figure(folder / "limits", rows, _COLUMNS, size=(11.0, 0.7 + 2.25 * rows)) as panels:
+    rows, columns = _grid(shown)
+    with figure(folder / "limits", rows, columns, size=(11.0, 0.7 + 2.25 * rows)) as panels:
         for axes, axis in zip(panels, shown, strict=False):
             for k, arm in reversed(list(enumerate(ARMS))):
                 _rate(axes, runs, arm, axis, _APART * (k - 0.5 * (len(ARMS) - 1)))
@@ -65,8 +65,8 @@ def _rate(axes: Axes, runs: LimitRuns, arm: LimitArm, axis: Axis, aside: float) 
 
 
 def _displacement(runs: LimitRuns, shown: Sequence[Axis], folder: Path) -> Figure:
-    rows = ceil(len(shown) / _COLUMNS)
-    with figure(folder / "limits_displacement", rows, _COLUMNS, size=(11.0, 0.7 + 2.25 * rows)) as panels:
+    rows, columns = _grid(shown)
+    with figure(folder / "limits_displacement", rows, columns, size=(11.0, 0.7 + 2.25 * rows)) as panels:
         for axes, axis in zip(panels, shown, strict=False):
             for k, arm in enumerate(_PUSHING):
                 _pushes(axes, runs, arm, axis, 0.14 * (k - 1))
@@ -80,6 +80,11 @@ def _displacement(runs: LimitRuns, shown: Sequence[Axis], folder: Path) -> Figur
         "medians as lines. The scale is linear up to 1 mm."
     )
     return Figure("limits_displacement", caption)
+
+
+def _grid(shown: Sequence[Axis]) -> tuple[int, int]:
+    """Return into how many rows and columns panels of some axes are put."""
+    return ceil(len(shown) / _COLUMNS), min(len(shown), _COLUMNS)
 
 
 def _pushes(axes: Axes, runs: LimitRuns, arm: LimitArm, axis: Axis, aside: float) -> None:

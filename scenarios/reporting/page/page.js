@@ -130,7 +130,9 @@ const page = (() => {
     layout.margin = {l: 44, r: 6, t: 30, b: 40, ...layout.margin};
     layout.font = {size: 12, ...layout.font};
     if (layout.meta?.time)  // the titles of panels
-      layout.annotations = layout.annotations?.map(title => ({...title, xshift: -36, font: {...title.font, size: 13}}));
+      layout.annotations = layout.annotations?.map(title => ({
+        ...title, text: wrapped(title.text, div.clientWidth / 8), align: "left", xshift: -36, font: {...title.font, size: 13},
+      }));
     if (layout.meta?.list) {
       const {tickvals, ticktext} = layout.yaxis;
       const spread = Math.max(0, ...data.flatMap(({y = []}) => Array.from(array(y), v => Math.abs(v - Math.round(v)))));
