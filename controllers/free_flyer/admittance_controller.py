@@ -109,8 +109,8 @@ class AdmittanceController(GripperController[Inputs, Outputs]):
       does what a wrong mass makes of an acceleration.
     - With x_v the virtual body's displacement from the goal, k_M x_v'' + k_B x_v' + k_D x_v = F (`VirtualBody`): k_D
       and k_B of table 4.1 by behaviour, k_M = inertia_ratio times the robot's mass and inertia. The gripper's
-      pose and the virtual one differ by what the observer has not yet told. Unlike under eq. (3.25), where the body
-      behind the arm is felt, a force at G does not turn the gripper.
+      pose and the virtual one differ by what the observer has not estimated yet. Unlike under eq. (3.25), where the
+      body behind the arm is felt, a force at G does not turn the gripper.
     - The base follows the pose that puts the gripper there: with e, phi its errors in W and B and f, tau the estimate,
 
         F = R_WB^T (m (k_x e + k_v e' + a_v) - f),  M = I_B (k_R phi + k_w phi' + dw_v) + w x I_B w - R_WB^T tau.

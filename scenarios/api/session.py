@@ -348,7 +348,7 @@ def open(  # noqa: A001 (handover.open is named like it)
 
     Args:
         subject: as of `handover.run`.
-        seed: likewise.
+        seed: as of `handover.run`.
         place: a unit that is left out; its outputs are set instead, `s["unit.port"] = value`.
         units: what takes the place of a scenario's units, by their names: files of FMUs, or blocks as `my_arm:MyArm`.
         start: of a system, an SSP or an FMU: the time from which it is stepped, s, as of `handover.run`.

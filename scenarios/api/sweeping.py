@@ -82,15 +82,15 @@ def sweep(
             a list varies the unit.
         out: the folder of the campaign.
         start: as of `handover.run`.
-        stop: likewise.
-        step: likewise.
-        inputs: likewise.
+        stop: as of `handover.run`.
+        step: as of `handover.run`.
+        inputs: as of `handover.run`.
         workers: runs at the same time, by default one a core.
         scheduler: address of a Dask scheduler whose workers do the runs.
         record: as of `handover.run`; of a file they are metrics, too.
         algorithm: as of `handover.run`.
-        isolate: likewise.
-        options: likewise.
+        isolate: as of `handover.run`.
+        options: as of `handover.run`.
         progress: whether a bar is shown, where there is a notebook or a terminal.
         parameters: what is varied and set of parameters whose names are also those of options.
         **named: what is varied and set of the others.

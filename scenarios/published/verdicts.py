@@ -235,8 +235,9 @@ def min_trials_for(share: float) -> int:
 
 def with_shortfall(reason: str, n: int, min_trials: int) -> str:
     """Add to a reason that the trials are too few for its rule to be met, if they are."""
+    runs = "1 run" if n == 1 else f"{n} runs"
     shortfall = (
-        f"With {n} runs nothing could have met this rule: it takes at least {min_trials}." if n < min_trials else ""
+        f"With {runs} nothing could have met this rule: it takes at least {min_trials}." if n < min_trials else ""
     )
     return f"{reason.strip()} {shortfall}".strip()
 

@@ -83,7 +83,7 @@ class VisualServo:
     GIVEN_UP, which does not close; `verdict` says why: OUT_OF_REACH if no search within the limits brings the model's
     gripper to its goal, else LIMITS if the command is at one or at windup, else NO_PROGRESS.
 
-    A state optimisation or a loop of algorithm 1 that does not converge is used as far as it came, and told by
+    A state optimisation or a loop of algorithm 1 that does not converge is used as far as it came, and signalled by
     `estimate_converged` and `step_converged`.
 
     With `delivers`, HOLD is followed by CARRY and DROP: see `Delivery`. `Task` has the phases.

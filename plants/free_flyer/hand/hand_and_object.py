@@ -74,7 +74,7 @@ class HandAndObject:
 
     - `FloatingObject`: a rigid box of 0.1 kg in microgravity. `FlyerGripper` holds it by a stiff spring in all six
       directions that slides at its limits, or has it pressed against its palm. A hand that holds it is joined to its
-      course by the arm's and wrist's springs, which yield at the force that a person cares to bear (`FlyerHand`).
+      course by the arm's and wrist's springs, which yield at the force that a person tolerates (`FlyerHand`).
     - `FlyerPerson` moves the hand's course and decides when the fingers close; it pulls and pushes by an effort against
       the force on the hand (`Effort`). `HandTremor` is added to the course. A fist pushes the palm by the arm's spring.
     - `HandFingers`: 14 joints whose phalanges, capsules, stop at the object, and push it by springs where they cannot
@@ -89,7 +89,7 @@ class HandAndObject:
       its own, and activity stays WAIT.
 
     One unit, because a bare 0.1 kg object that two units exchange by forces is unstable at a few milliseconds. Here the
-    gripper's displacement goes in and its wrench, the mean over the step, comes out: stable at 16 and 32 ms. In a
+    gripper's displacement goes in and its wrench, the mean over the step, is put out: stable at 16 and 32 ms. In a
     system this unit comes after the robot; the gripper is interpolated from the last step's pose to this one's, and its
     wrench acts on the robot in the next step.
 

@@ -222,7 +222,7 @@ class StereoCamera:
     blurred, lit unevenly and given sensor noise. A step shows the scene at its start, as the inputs give it; one that
     takes no pictures (decimation) repeats the last ones.
 
-    What may be amiss: the left or the right lens is covered for a while, light is poor, pictures get lost (each by
+    What may be wrong: the left or the right lens is covered for a while, light is poor, pictures get lost (each by
     itself), tape covers markers, a card hides the ball from the left and the right camera. A gripper that hides the
     ball as it comes near, as a bulkier one than is painted here would, is `hide_ball_within`; one behind which nothing
     is seen any more, `cover_within`.

@@ -86,7 +86,7 @@ Environment, when a tool loads the units
                       other [default: of the one that built the unit, or python3]
   FMU_PYTHON_PROCESS  1: Python in a process of its own for each instance;
                       0: never [default: where none can be loaded]
-  FMU_PYTHON          path of the interpreter to take, likewise
+  FMU_PYTHON          path of the interpreter to take
   FMU_PYTHON_TIMEOUT  seconds that a call of that process may take, 0 for no
                       limit [default: 300]
 """

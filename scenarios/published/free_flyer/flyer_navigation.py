@@ -54,7 +54,7 @@ class FlyerNavigation(PublishedExperiment):
     """Both behaviours give and receive with a navigation that is biased, drifts, or comes seldom or late.
 
     One error at a time, at three or four levels up to where handovers fail, three runs each; every run draws its own
-    bias. The controllers know nothing of it: a delay that they were told of would be refused where their loop is not
+    bias. The controllers know nothing of it: a delay that they knew would be refused where their loop is not
     stable. The thesis says nothing of its navigation's errors. The quick plan is the greatest level of each, once.
     """
 

@@ -126,12 +126,13 @@ def _delay(runs: NavigationRuns, behaviour: Behaviour, stable: bool) -> Claim | 
     if not levels:
         return None
     rows = [row for x in levels for task in TRIED for row in runs.of(task, behaviour, DELAY.variation(x))]
-    note = f"Its poles bear {1e3 * most:.0f} ms; tried {', '.join(f'{1e3 * x:g}' for x in levels)} ms, unknown to it."
+    tried = ", ".join(f"{1e3 * x:g}" for x in levels)
+    note = f"By its poles it is stable up to {1e3 * most:.0f} ms; tried {tried} ms, unknown to it."
     if stable:
-        claim = f"With an old estimate, of a delay that its poles bear, the {behaviour.item} robot hands over"
+        claim = f"With an old estimate, at which its loop is stable by its poles, the {behaviour.item} robot hands over"
         return every_claim(claim, "", (0, 0), (succeeded_touched(rows), len(rows)), f"{note} {unfinished_note(rows)}")
     facts: dict[str, Any] = {
-        "claim": f"An old estimate, of a delay that its poles do not bear, makes the {behaviour.item} robot fail",
+        "claim": f"An old estimate, at which its loop is unstable by its poles, makes the {behaviour.item} robot fail",
         "published": "",
         "beyond": True,
     }

@@ -63,7 +63,7 @@ _LOOPS = tuple(_Loop(behaviour, lags) for behaviour in Behaviour for lags in (Fa
 
 
 class FlyerStability(PublishedExperiment):
-    """A twist on the robot, in a host that steps all units in parallel, with a delay that nobody has told it.
+    """A twist on the robot, in a host that steps all units in parallel, with a delay unknown to the robot.
 
     Each unit hands on its results a communication step late, so three steps come on top of the thrust's own delay. The
     controller's linearised loop, with the sum of both as its delay, says by its poles where the robot comes to rest
