@@ -9,6 +9,7 @@ from importlib.metadata import version as version_of
 from pathlib import Path
 from urllib.parse import unquote
 
+from docutils import nodes
 from nbclient import NotebookClient
 from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
@@ -67,6 +68,35 @@ def set_code(app: Sphinx, what: str, name: str, obj: object, options: object, li
             lines[i] = f"{line}:"
 
 
+def set_columns(app: Sphinx, context: object, lines: list[str]) -> None:  # noqa: ARG001
+    """Show the columns of a command's help as code: as lines of text, which they are else, they are no columns."""
+    text: list[str] = []
+    for line in lines:
+        shown = line.removeprefix("| ")
+        is_of_column = shown != line and shown.startswith(" ")
+        if is_of_column and not (text and text[-1].startswith("    ")):
+            text += ["", "::", ""]
+        text += [f"    {shown}"] if is_of_column else ["", shown, ""] if shown != line else [line]
+    lines[:] = text
+
+
+def set_defaults(app: Sphinx, context: object, lines: list[str]) -> None:  # noqa: ARG001
+    """Show an option's default as it is typed, not as Python writes it."""
+    lines[:] = [re.sub(r"``(?:PosixPath\()?'([^']*)'\)?``", r"``\1``", line) for line in lines]
+
+
+_NUMBER_WITH_UNIT = re.compile(r"(?<=\d) (?=(?:%|(?:mm|cm|m|ms|us|s|kg|g|N|Nm|bar|rad|deg|Hz|px|MB)\b))")
+
+
+def keep_units(app: Sphinx, doctree: nodes.document, page: str) -> None:  # noqa: ARG001
+    """Keep numbers on one line with their units, but in code, which readers copy."""
+    for text in list(doctree.findall(nodes.Text)):
+        if not isinstance(text.parent, nodes.literal | nodes.literal_block | nodes.raw | nodes.math | nodes.math_block):
+            kept = _NUMBER_WITH_UNIT.sub("\N{NO-BREAK SPACE}", text)
+            if kept != text:
+                text.parent.replace(text, nodes.Text(kept))
+
+
 def check_links(app: Sphinx, failure: Exception | None) -> None:
     """Look whether each file that a built page links, loads or shows is there: Sphinx asks this of Markdown's alone.
 
@@ -85,4 +115,7 @@ def setup(app: Sphinx) -> None:
     """Show examples in docstrings as code, and equations without a script from the network."""
     app.add_html_math_renderer("mathml", (show_inline, None), (show_block, None))
     app.connect("build-finished", check_links)
+    app.connect("doctree-resolved", keep_units)
+    app.connect("sphinx-click-process-description", set_columns)
+    app.connect("sphinx-click-process-options", set_defaults)
     app.connect("autodoc-process-docstring", set_code)

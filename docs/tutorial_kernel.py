@@ -49,7 +49,7 @@ def _describe(environment: Path) -> None:
         "argv": [str(programs / "python"), "-m", "ipykernel_launcher", "-f", "{connection_file}"],
         "display_name": "handover",
         "language": "python",
-        "env": {"PATH": f"{programs}{os.pathsep}${{PATH}}", "PYTHONNOUSERSITE": "1", "COLUMNS": "100"},
+        "env": {"PATH": f"{programs}{os.pathsep}${{PATH}}", "PYTHONNOUSERSITE": "1", "COLUMNS": "88"},
     }
     file = environment / "jupyter" / "kernels" / "tutorial" / "kernel.json"
     file.parent.mkdir(parents=True)
