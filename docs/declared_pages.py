@@ -24,6 +24,7 @@ from handover.fmus.catalog import UNITS, Entry, import_class
 from handover.fmus.contents.documentation import Row, cited, items, parse, row, seconds
 from handover.fmus.layout import Form
 from handover.scenarios.catalog import SCENARIOS, SYSTEMS, RobotSystem
+from handover.scenarios.experiment.display_unit import unit_symbol
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.paper import paper_entry, parameter_origins
 from handover.scenarios.experiment.places import ports_of_place
@@ -46,7 +47,7 @@ def write(folder: Path, runs: Mapping[str, GalleryRun], experiments: Mapping[str
     templates = jinja2.Environment(
         loader=loader, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
     )
-    templates.filters.update(cell=cell, seconds=seconds, sentence=sentence)
+    templates.filters.update(cell=cell, seconds=seconds, sentence=sentence, unbroken=unbroken, unit_symbol=unit_symbol)
     robots = [(system, [UNITS[unit] for unit in system.units]) for system in SYSTEMS]
     of_system = {s.package: [n for n, e in experiments.items() if e.scenario in s.scenarios] for s in SYSTEMS}
     shown = {"robots": SYSTEMS, "runs": runs, "experiments": experiments, "of_system": of_system}
@@ -142,6 +143,11 @@ def environment_variables() -> dict[str, str]:
 def cell(text: object) -> str:
     """Return a text as it stands in a cell of a table in Markdown."""
     return str(text).replace("|", "\\|").replace("\n", " ").replace("*", "\\*").replace("<", "&lt;")
+
+
+def unbroken(text: str) -> str:
+    """Return a text that stays on one line."""
+    return text.replace(" ", "\N{NO-BREAK SPACE}")
 
 
 def _feedthrough(d: Description) -> list[tuple[str, str]]:

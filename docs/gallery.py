@@ -5,10 +5,12 @@ Both are those that tests keep (`support.kept_runs`): made again only when code,
 
 import json
 import shutil
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
+from PIL import Image
 from support.commands import LOADED, forking
 from support.in_process_pool import use_in_process_pool
 from support.kept_runs import kept_run
@@ -17,14 +19,20 @@ import handover
 from handover.cosim.system.graph import system_svg
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.display_unit import unit_symbol
+from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.published.catalog import EXPERIMENTS
 from handover.scenarios.published.published_experiment import (
     Claim,
     ComparisonTable,
     PaperResults,
+    draw_figures,
     verdict_counts,
 )
+from handover.scenarios.reporting.run_figures import draw_record
+from handover.scenarios.results.run_facts import RunFacts, record_of
+from handover.scenarios.results.run_folder import RunFolder
 from handover.scenarios.results.tables import format_metric
+from handover.scenarios.results.tolerated_faults import ToleratedFaults
 
 _FIRST = ("scene", "pictures", "shape", "hand", "path", "error", "motion")
 """Names of figures that show most of a scenario, best first."""
@@ -33,7 +41,7 @@ _OF_CAMPAIGNS = ("cli.paper", "cli.campaign", "published.catalog", "campaign.run
 """Modules that campaigns need besides."""
 
 _POINTS: Mapping[str, Sequence[int]] = {
-    "flyer-approaches": (0, 2),
+    "flyer-approaches": range(0, 500, 50),
     "flyer-controllers": (6, 8, 10, 74),
     "flyer-handover": (0, 3),
     "flyer-impedance": (0, 3, 6, 9),
@@ -41,24 +49,38 @@ _POINTS: Mapping[str, Sequence[int]] = {
     "flyer-stability": range(30, 45, 3),
     "flyer-study": (20, 28),
     "helix-1": (8,),
-    "helix-2": (9,),
+    "helix-2": (5, 9),
     "helix-3": (4,),
-    "helix-disturbances": (4,),
-    "helix-improvements": (208,),
-    "helix-places": (0,),
-    "helix-reflex": (0,),
-    "helix-workspace": (0,),
+    "helix-disturbances": (0, 4, 8, 12),
+    "helix-improvements": (128, 208),
+    "helix-places": range(0, 200, 40),
+    "helix-reflex": (0, 1, 2, 3),
+    "helix-workspace": range(0, 50, 4),
     "ir-convergence": range(0, 10, 2),
-    "ir-limits": range(100, 125, 5),
+    "ir-limits": range(0, 125, 5),
     "ir-sensor": (9, 10, 11),
     "ir-table": (0, 1, 2, 3, 20, 21, 22, 23),
     "vsl-1": (1, 21, 26, 46, 51, 71),
     "vsl-2": (0, 1, 2, 3, 108, 109),
 }
-"""Points of each experiment's plan that are run, once each: so few that all of them take four minutes of CPU."""
+"""Points of each experiment's plan that are run, once each: so few that all of them take some minutes of CPU."""
 
-Files = Mapping[str, str]
-"""Paths of files by name, relative to the site."""
+_PIXELS_ON_PAPER = 96.0
+"""Of a screen, by CSS, an inch."""
+
+
+@dataclass(frozen=True)
+class ShownFigure:
+    """A figure in a page: its path relative to the site, its caption, and its size on paper, in a screen's pixels."""
+
+    path: str
+    caption: str
+    width: int
+    height: int
+
+
+Figures = Mapping[str, ShownFigure]
+"""Figures by name, in the order of a page."""
 
 
 @dataclass(frozen=True)
@@ -85,13 +107,13 @@ class GalleryRun:
 
     success: bool
     reason: str
-    figures: Files
+    figures: Figures
     page: str
     diagram: str
     metrics: Sequence[MetricRow]
 
     @property
-    def first(self) -> str:
+    def first(self) -> ShownFigure:
         """The figure that shows most."""
         known = [self.figures[name] for name in _FIRST if name in self.figures]
         return (known or list(self.figures.values()))[0]
@@ -120,14 +142,14 @@ class GalleryExperiment:
     whole: int
     claims: Sequence[Claim]
     tables: Sequence[ComparisonTable]
-    figures: Files
+    figures: Figures
     metrics: Sequence[MetricRow]
 
     @property
     def extent(self) -> str:
         """How many runs there are here, of how many, as a sentence."""
-        number = "one run" if self.runs == 1 else f"{self.runs} runs"
-        return f"Here are {number} of its {self.whole:,}; `--quick` makes {self.quick}."
+        number = "is one run" if self.runs == 1 else f"are {self.runs} runs"
+        return f"Here {number} of its {self.whole:,}; `--quick` makes {self.quick}."
 
     @property
     def verdicts(self) -> str:
@@ -144,7 +166,7 @@ def warm_up() -> None:
 def gallery_run(name: str, files: Path) -> GalleryRun:
     """Run a scenario with its defaults, unless that is kept, and copy figures and page below the site's files."""
     run = kept_run("run", name)
-    figures = _copied(run / "figures", files, f"gallery/{name}")
+    figures = _drawn(lambda folder: _figures_of_run(RunFolder.of_run(run), folder), files, f"gallery/{name}")
     page = f"gallery/{name}/report.html"
     shutil.copyfile(run / "report.html", files / page)
     summary = json.loads((run / "summary.json").read_text(encoding="utf-8"))
@@ -176,7 +198,11 @@ def gallery_experiment(name: str, files: Path) -> GalleryExperiment:
         whole=experiment.plan(quick=False).size,
         claims=results.claims,
         tables=results.tables,
-        figures=_copied(campaign / "figures", files, f"gallery/experiments/{name}"),
+        figures=_drawn(
+            lambda folder: draw_figures(experiment, table, campaign / "runs", folder),
+            files,
+            f"gallery/experiments/{name}",
+        ),
         metrics=[MetricRow(n, unit_symbol(table.unit(n)), table.description(n)) for n in table.metrics],
     )
 
@@ -198,9 +224,25 @@ def metrics_of(run: GalleryRun, campaigns: Iterable[GalleryExperiment]) -> list[
     return list(rows.values())
 
 
-def _copied(figures: Path, files: Path, name: str) -> Files:
-    """Copy a folder's figures into one that is made for them."""
+def _figures_of_run(run: RunFolder, to: Path) -> Sequence[Figure]:
+    faults, record = ToleratedFaults(), record_of(run)
+    assert record is not None, f"{run.path} has no record"
+    figures = draw_record(RunFacts.read(run), record, to, faults)
+    assert not faults.lines, faults.lines
+    return figures
+
+
+def _drawn(draw: Callable[[Path], Iterable[Figure]], files: Path, name: str) -> Figures:
+    """Draw figures with their captions into a folder that is made for them."""
     folder = files / name
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    return {f.stem: f"{name}/{shutil.copyfile(f, folder / f.name).name}" for f in sorted(figures.glob("*.png"))}
+    shown: dict[str, ShownFigure] = {}
+    with TemporaryDirectory() as drawn:
+        for figure in draw(Path(drawn)):
+            file = shutil.copy(Path(drawn) / f"{figure.name}.png", folder)
+            with Image.open(file) as picture:
+                per_inch = picture.info["dpi"][0]
+                width, height = (round(_PIXELS_ON_PAPER * pixels / per_inch) for pixels in picture.size)
+            shown[figure.name] = ShownFigure(f"{name}/{figure.name}.png", figure.caption, width, height)
+    return shown

@@ -12,11 +12,13 @@ from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
 from unittest.mock import Mock
+from xml.etree import ElementTree
 
 import click
 import cv2
 import numpy as np
 import pytest
+from support.commands import call
 from support.documentation import ROOT
 
 import handover
@@ -128,6 +130,33 @@ def test_an_equation_that_a_docstring_no_longer_has_is_named():
     assert r"$\ddot z = -g$" in docs["VacuumGripper"]
     with pytest.raises(equations.EquationGone, match="VacuumGripper no longer has"):
         equations.with_latex("VacuumGripper", "Holds an object.")
+
+
+def test_the_reference_shows_the_options_of_each_command():
+    """Those that the program itself answers to, of a command and of one in a group."""
+    shown = maker("loaded_commands").main.commands
+    for command, called in ((shown["run"], ["run"]), (shown["study"].commands["power"], ["study", "power"])):
+        printed = set(re.findall(r"(?<!\S)--[a-z-]+", call(*called, "--help").output))
+        options = {o for p in command.params if not getattr(p, "hidden", False) for o in p.opts if o.startswith("--")}
+        assert options
+        assert options <= printed
+
+
+def test_each_equation_is_mathml_that_browsers_lay_out():
+    """No sign of LaTeX is left as text, and a line that ends begins another row of a table."""
+    converter = pytest.importorskip("latex2mathml.converter", reason="the extra docs is not installed")
+    written = [e for equations in maker("equations")._equations().values() for e in equations.values()]
+    for equation in written:
+        mathml = ElementTree.fromstring(converter.convert(equation, display="block"))
+        assert not {"&", "\\"} & set("".join(mathml.itertext())), equation
+        assert not list(mathml.iter("{*}mspace")) or r"\\" not in equation, equation
+
+
+def test_a_sentence_says_how_many_runs_there_are():
+    """In the number's grammar, and in thousands."""
+    made = maker("gallery").GalleryExperiment
+    one, many = (made("", "", "", runs, 2, 1280, (), (), {}, ()).extent for runs in (1, 5))
+    assert (one.split(";")[0], many.split(";")[0]) == ("Here is one run of its 1,280", "Here are 5 runs of its 1,280")
 
 
 def test_every_published_experiment_is_run_for_the_gallery():

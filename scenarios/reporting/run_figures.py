@@ -62,7 +62,7 @@ def draw_run(folder: RunFolder) -> list[str]:
     with disk_errors_reported(folder.figures):
         try:
             folder_within(unfinished)
-            _draw_record(facts, record, unfinished, faults)
+            draw_record(facts, record, unfinished, faults)
             folder_within(folder.figures)
             for file in unfinished.iterdir():
                 os.replace(file, folder.figures / file.name)
@@ -71,19 +71,24 @@ def draw_run(folder: RunFolder) -> list[str]:
     return faults.lines
 
 
-def _draw_record(facts: RunFacts, record: Record, to: Path, faults: ToleratedFaults) -> None:
+def draw_record(facts: RunFacts, record: Record, to: Path, faults: ToleratedFaults) -> Sequence[Figure]:
+    """Draw a run's figures into a folder; return them in the order of a page. What failed is noted in `faults`.
+
+    Raises:
+        InvalidRunFolder: the run is of another version of its scenario.
+    """
     experiment = facts.experiment
     if experiment is None:
         faults.lines += facts.not_drawn
         with faults.tolerated("the outputs could not be drawn"):
-            draw_time_figures(figures_of_outputs(facts.run.get("units", {}), record), record.time, to)
-        return
+            return draw_time_figures(figures_of_outputs(facts.run.get("units", {}), record), record.time, to)
+        return ()
     try:
         parameters = parameters_of(type(experiment), facts.run["parameters"])
         evaluator = experiment.evaluator_of_record(parameters, read_picture_files(facts.folder.pictures))
         with faults.tolerated("the record could not be evaluated again"):
             _evaluate(LackingRecord(record, experiment.units), evaluator)
-        draw_figures(experiment, parameters, evaluator, record, to, faults)
+        return draw_figures(experiment, parameters, evaluator, record, to, faults)
     except (InvalidParameter, KeyError) as e:
         raise InvalidRunFolder(
             facts.folder.path, f"the run is of another version of {facts.scenario}: {e.args[0]}"
