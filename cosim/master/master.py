@@ -251,8 +251,9 @@ class Master:
         """Run another job with the units in the thread that they are called in, with the same time limit.
 
         Raises:
-            UnitHung: a unit does not return. Whatever else the job raises.
+            RuntimeError: the units are freed. UnitHung: a unit does not return. Whatever else the job raises.
         """
+        self._check_is_entered()
         mark_as_host()
         return self._watchdog.run_job(job)
 
@@ -285,9 +286,12 @@ class Master:
         self._watchdog.close()
         return first
 
-    def _check_can_run(self, stop: Fraction) -> None:
+    def _check_is_entered(self) -> None:
         if self._is_left:
-            raise RuntimeError("the units are freed: step inside of the `with` block that holds them")
+            raise RuntimeError("the units are freed: call them inside of the `with` block that holds them")
+
+    def _check_can_run(self, stop: Fraction) -> None:
+        self._check_is_entered()
         if self.ended is not None:
             raise RuntimeError(f"{self.ended.summary}: make another master to simulate again")
         for name, instance in self.ensemble.instances.items():

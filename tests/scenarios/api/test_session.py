@@ -51,6 +51,18 @@ def test_a_tunable_parameter_may_change(fmi: int):
         assert s["gain.y"] == 5.0
 
 
+def test_units_of_a_session_that_is_closed_are_not_called():
+    """A call of a unit that is freed would end the program."""
+    with handover.open(gain(native_fmu("tuned_gain", 3))) as s:
+        s.step(0.1)
+        state = s.save()
+    for call in (s.save, partial(s.restore, state), partial(s.__getitem__, "gain.a"), partial(s.step, 0.1)):
+        with pytest.raises(RuntimeError, match="the units are freed"):
+            call()
+    with pytest.raises(RuntimeError, match="the units are freed"):
+        s["gain.a"] = 2.0
+
+
 def test_what_cannot_be_set_or_read_is_refused(wording: Wording):
     s = handover.open("ir_grasp")
     calls: list[Callable[[], object]] = [
