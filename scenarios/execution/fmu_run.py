@@ -16,7 +16,7 @@ from handover.cosim.system.system import PortName, System
 from handover.cosim.system.wiring_faults import value_faults
 from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.execution.file_experiment import ENDLESS, FileExperiment, SettableParameters, system_experiment
-from handover.scenarios.execution.input_file import columns_of, read_inputs
+from handover.scenarios.execution.input_file import InputTable, columns_of, read_inputs
 from handover.scenarios.execution.ssp_run import checked_stop, naming_step
 from handover.scenarios.execution.unit_values import start_values
 from handover.scenarios.experiment.parameters import InvalidParameter
@@ -31,8 +31,8 @@ def is_fmu(name: str) -> bool:
 class FmuParameters(SettableParameters):
     """The variables of an FMU that can be given start values: parameters, inputs, and others."""
 
-    def __init__(self, description: FmuDescription) -> None:
-        self._description = description
+    def __init__(self, description: FmuDescription, table: InputTable) -> None:
+        self._description, self._table = description, table
 
     @property
     def ports(self) -> Mapping[str, FmuPort]:
@@ -50,6 +50,7 @@ class FmuParameters(SettableParameters):
     def faults(self, texts: Sequence[str]) -> Sequence[str]:
         """Return what is wrong with texts `NAME=VALUE`."""
         start, faults = start_values(self.ports, texts)
+        faults += self._table.faults(self.ports, [text.partition("=")[0].strip() for text in texts])
         return [*faults, *value_faults(self._description.identifier, self._description, start)]
 
 
@@ -91,15 +92,19 @@ class FmuRun:
         system.units[d.identifier] = replace(unit, start=start)
         if self.step is None and not self.endless:
             system.presume_steps(until - system.start)
-        if self.inputs is not None:
-            for port, series in read_inputs(self.inputs, d.inputs, start).items():
-                system.follow(PortName(d.identifier, port), series)
+        table = InputTable({}) if self.inputs is None else read_inputs(self.inputs, d.inputs, start)
+        if faults := table.faults(d.settable, [text.partition("=")[0].strip() for text in self.parameters]):
+            raise UsageError(f"{self.path}: {'; '.join(faults)}") from InvalidParameter(faults)
+        for port, series in table.series.items():
+            system.follow(PortName(d.identifier, port), series)
+        if not self.endless:
+            system.notes += [f"{self.inputs}: {line}" for line in table.notes(float(system.start), float(until))]
         try:
             system.check()
         except WiringError as e:
             raise UsageError(f"{self.path}: {'; '.join(first_faults(naming_step(e.faults)))}") from e
         heading = f"{d.name}, an FMU by itself"
-        return system_experiment(self.path.name, heading, system, until, settable=FmuParameters(d), alone=True)
+        return system_experiment(self.path.name, heading, system, until, settable=FmuParameters(d, table), alone=True)
 
     def as_source(self, start: Fraction, stop: Fraction) -> dict[str, Any]:
         """Return what a run's folder keeps, so that it can be resumed; `reopened` reads it."""

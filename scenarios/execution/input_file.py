@@ -6,7 +6,8 @@ else is held until the next one.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -28,12 +29,40 @@ Column = tuple[FmuPort, int]
 """An input and which of its entries, counted from 0 in row-major order."""
 
 
+@dataclass(frozen=True)
+class InputTable:
+    """What inputs follow over time.
+
+    Attributes:
+        series: by input.
+        columns: the names of the columns, inputs and entries of some.
+    """
+
+    series: Mapping[str, TimeSeries]
+    columns: Collection[str] = ()
+
+    def faults(self, ports: Mapping[str, FmuPort], names: Collection[str]) -> list[str]:
+        """Return a line for each name of which nothing would come if it had a start value: the table has it all."""
+        covered = {*self.columns}
+        covered |= {p.name for p in ports.values() if p.name in self.series and covered.issuperset(element_names(p))}
+        return [f"{name}: the table of inputs gives it; one of both is right" for name in names if name in covered]
+
+    def notes(self, start: float, stop: float) -> list[str]:
+        """Return a line if none of several times lies within the run, so that inputs stay at one value."""
+        times = next(iter(self.series.values())).times if self.series else ()
+        if len(times) < 2 or (times[0] < stop and times[-1] > start):
+            return []
+        stay = "first" if times[0] >= stop else "last"
+        span = f"from {times[0]:g} to {times[-1]:g} s, and the run goes from {start:g} to {stop:g} s"
+        return [f"the table of inputs goes {span}: they stay at its {stay} values"]
+
+
 def columns_of(ports: Mapping[str, FmuPort]) -> dict[str, Column]:
     """Return the names of all scalars among some ports: a port's own, or of an array `p[1]`, `p[2]`, ..."""
     return {name: (p, k) for p in ports.values() for k, name in enumerate(element_names(p))}
 
 
-def read_inputs(path: Path, inputs: Mapping[str, FmuPort], start: Mapping[str, Any]) -> dict[str, TimeSeries]:
+def read_inputs(path: Path, inputs: Mapping[str, FmuPort], start: Mapping[str, Any]) -> InputTable:
     """Read what inputs follow over time; entries of an array without a column keep their start values.
 
     Args:
@@ -71,7 +100,8 @@ def read_inputs(path: Path, inputs: Mapping[str, FmuPort], start: Mapping[str, A
         cells = [(i, row[column]) for i, row in lines]
         values[name] = _numbers(cells, name, partial(_value, port), faults)
     _refuse(path, faults)
-    return {port.name: _series(port, times, columns, values, start) for port, _ in columns.values()}
+    series = {port.name: _series(port, times, columns, values, start) for port, _ in columns.values()}
+    return InputTable(series, columns)
 
 
 def value_of(port: FmuPort, text: str) -> int | float:
@@ -99,6 +129,8 @@ def _columns(path: Path, names: Sequence[str], inputs: Mapping[str, FmuPort]) ->
         else:
             near = nearest(n, valid) if len(faults) < MOST_FAULTS else ""
             faults.append(f"no input {n!r}; {near}")
+    if not faults and names == [TIME]:
+        faults.append(f"there is no column but {TIME!r}; {nearest('', valid)}")
     _refuse(path, faults)
     return {n: valid[n] for n in names if n != TIME}
 

@@ -1,6 +1,7 @@
 """Tables of inputs over time: values, kinds, and that no text raises anything but one error."""
 
 import contextlib
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -36,7 +37,7 @@ def test_each_kind_is_read_and_entries_without_a_column_keep_their_start(tmp_pat
     table.write_text(
         'time, "g",n,"R[2,1]",b\n\n0,drive,-5,30,1\n1.5,1,7,40,18446744073709551615\n', encoding="utf-8-sig"
     )
-    series = read_inputs(table, INPUTS, {"R": [[9.0, 8.0], [7.0, 6.0]]})
+    series = read_inputs(table, INPUTS, {"R": [[9.0, 8.0], [7.0, 6.0]]}).series
     assert set(series) == {"g", "n", "R", "b"}
     assert series["b"].at(2.0).tolist() == [2**64 - 1]
     assert [series["g"].at(t).tolist() for t in (0.0, 1.4, 1.5)] == [[4], [4], [1]]
@@ -51,6 +52,7 @@ def test_each_kind_is_read_and_entries_without_a_column_keep_their_start(tmp_pat
         "",
         "time,x\n",
         "x\n0\n",
+        "time\n0\n1\n",
         "time;x\n0,5;0\n",
         "time,force\n0,1\n",
         "time,x,x\n0,1,1\n",
@@ -75,6 +77,24 @@ def test_what_is_no_table_or_does_not_fit_an_input_is_told(tmp_path: Path, text:
     with pytest.raises(UsageError) as raised:
         read_inputs(table, INPUTS, {})
     wording.check(raised.value)
+
+
+def test_a_start_value_that_the_table_replaces_is_a_fault(tmp_path: Path):
+    table = tmp_path / "inputs.csv"
+    table.write_text('time,x,"R[1,1]"\n0,1,2\n')
+    read = read_inputs(table, INPUTS, {})
+    assert [len(read.faults(INPUTS, [name])) for name in ("x", "R[1,1]", "R", "R[1,2]", "n")] == [1, 1, 0, 0, 0]
+    table.write_text('time,"R[1,1]","R[1,2]","R[2,1]","R[2,2]"\n0,1,2,3,4\n')
+    assert len(read_inputs(table, INPUTS, {}).faults(INPUTS, ["R"])) == 1
+
+
+@pytest.mark.parametrize(
+    ("times", "lines"), [((0, 1), 0), ((5, 6), 1), ((2, 3), 1), ((-3, -2), 1), ((-3, 0), 1), ((-3, 9), 0), ((7,), 0)]
+)
+def test_a_table_none_of_whose_times_are_in_the_run_is_told(tmp_path: Path, times: Sequence[float], lines: int):
+    table = tmp_path / "inputs.csv"
+    table.write_text("time,x\n" + "".join(f"{t},1\n" for t in times))
+    assert len(read_inputs(table, INPUTS, {}).notes(0.0, 2.0)) == lines
 
 
 @settings(max_examples=150)
