@@ -158,7 +158,9 @@ def _check_unit_values(
     for name, value in dict.fromkeys(item for values in at for item in values.items()):
         with _collected(faults, ""):
             check_value(experiment, system, name, value)
-    if not faults and settable_of(kind) is None:
+    if not faults and (settable := settable_of(kind)) is not None:  # all points have the same names
+        faults = dict.fromkeys(settable.faults([f"{name}={value}" for name, value in at[0].items()]), "")
+    elif not faults:
         for values, point in zip(at, points, strict=True):
             system.units = wired
             set_values(system, values)

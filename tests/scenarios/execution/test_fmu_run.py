@@ -139,10 +139,21 @@ def test_entries_of_an_array_are_columns(tmp_path: Path):
     assert last.tolist() == pytest.approx([1.0, 8.0, 9.0])
 
 
+def test_an_input_has_a_start_value_or_a_column_and_a_late_table_is_told(tmp_path: Path):
+    mass, inputs = native_fmu("mass", 3), table(tmp_path, "time,f\n7,0\n8,2\n")
+    for command in (("run", mass, "-p", "f=3"), ("sweep", mass, "f=1,2"), ("sweep", mass, "m=1,2", "-p", "f=3")):
+        assert "f: the table of inputs gives it" in refusal(*command, "--input", inputs)
+    result = run(mass, "--input", inputs, "--no-report", "--out", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    assert len(data_in(tmp_path / "out", "run")["notes"]) == 1
+
+
 @pytest.mark.parametrize("order", [1, -1])
 def test_an_array_and_an_entry_of_it_are_not_given_both(order: int):
     given = ["-pu=7,8,9", "-pu[2]=1"][::order]
     assert "u and u[2] are both given" in refusal("run", native_fmu("array_passer"), "--stop", "1", *given)
+    varied = ("u=7,8,9;1,2,3", "u[2]=1,2")[::order]
+    assert "u and u[2] are both given" in refusal("sweep", native_fmu("array_passer"), "--stop", "1", *varied)
 
 
 def test_a_start_value_that_is_nan_is_warned_of_unless_another_is_given(
