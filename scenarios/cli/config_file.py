@@ -153,10 +153,14 @@ def read_config(path: Path, ctx: click.Context) -> ConfigFile:
         try:
             if key in tables:
                 texts[tables[key]] = list(_texts(key, value))
+            elif key in options and options[key].name in defaults:
+                faults.append(f"{key}: another spelling of it is given, too; one of both is right")
             elif key in options:
                 defaults[str(options[key].name)] = _checked(options[key], ctx, value)
             elif key in _TABLES:
                 faults.append(f"no option {key!r}; the table [{key}] is for `handover sweep`")
+            elif key == "p":
+                faults.append("no option 'p'; the table [parameters] has what -p sets")
             else:
                 faults.append(f"no option {key!r}; {nearest(key, {**options, **tables})}")
         except click.BadParameter as e:
@@ -182,7 +186,7 @@ def _content(path: Path) -> dict[str, Any]:
 def _options(command: click.Command) -> Iterator[tuple[str, click.Parameter]]:
     """Yield the options that a file can give, by their keys."""
     for parameter in command.params:
-        if parameter.name in _TABLES.values():
+        if parameter.name in _TABLES.values() or getattr(parameter, "hidden", False):
             continue
         names = parameter.opts if isinstance(parameter, click.Option) else [f"--{parameter.name}"]
         for name in names:
