@@ -181,11 +181,11 @@ def path_of(name: str, value: Any) -> Path:
     """Return the path of a file or a folder.
 
     Raises:
-        InvalidInput: it is neither a text nor a path, or it is empty.
+        InvalidInput: it is neither a text nor a path, is empty, or has a zero byte, which no file system takes.
     """
     right = "a path, as a text or a Path,"
-    if value == "":
-        raise InvalidInput(f"{name} = '': {right} is right")
+    if value == "" or "\0" in str(value):
+        raise InvalidInput(f"{name} = {value!r:.60}: {right} is right")
     return Path(of_type(name, value, (str, os.PathLike), right))
 
 
@@ -281,6 +281,15 @@ def whole_number(name: str, value: Any, least: int = 0) -> int:
     if not is_whole or not least <= value <= GREATEST_SEED:
         raise InvalidInput(f"{name} = {value!r:.60}: a whole number from {least} to {GREATEST_SEED} is right")
     return int(cast(Any, value))
+
+
+def flag(name: str, value: Any) -> bool:
+    """Return a yes or no; a text such as "no" would count as yes.
+
+    Raises:
+        InvalidInput: it is neither.
+    """
+    return bool(of_type(name, value, (bool, np.bool_), "True or False"))
 
 
 def formats_of(formats: Sequence[str]) -> tuple[str, ...]:

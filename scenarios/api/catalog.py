@@ -9,6 +9,7 @@ from handover.cosim.fmu.file.description import FmuDescription, describe_fmu
 from handover.cosim.system.system import System
 from handover.fmus.build import cached
 from handover.fmus.catalog import UnknownBlock, UnknownUnit
+from handover.fmus.contents.fmi2_description import NoFmi2Form
 from handover.scenarios.api.arguments import (
     InvalidInput,
     errors_for_python,
@@ -48,7 +49,7 @@ def unit(name: str, fmi: Literal[2, 3] = 3) -> Path:
     try:
         with errors_for_python():
             return cached(name, fmi)
-    except (UnknownUnit, UnknownBlock) as e:
+    except (UnknownUnit, UnknownBlock, NoFmi2Form) as e:
         raise InvalidInput(str(e)) from e
 
 

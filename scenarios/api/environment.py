@@ -26,6 +26,7 @@ from handover.scenarios.api.arguments import (
     Seconds,
     errors_for_python,
     exact,
+    of_type,
     positive_seconds,
     several_texts,
     whole_number,
@@ -56,6 +57,9 @@ class ScenarioEnvironment(gymnasium.Env[Values, Values]):
         self, request: RunRequest, place: str, actions: Sequence[str] | None, observations: Sequence[str] | None,
         reward: Callable[[Session], float] | None, period: Seconds | None,
     ) -> None:  # fmt: skip
+        of_type("place", place, str, "the name of a unit")
+        if reward is not None and not callable(reward):
+            raise InvalidInput(f"reward = {reward!r:.60}: a function of the session is right")
         with errors_for_python(), ExitStack() as opened:
             request.check_options()
             self._request, self._asked = request, request.open(opened)
@@ -82,8 +86,12 @@ class ScenarioEnvironment(gymnasium.Env[Values, Values]):
         """Begin an episode; return the observation at 0 s and information.
 
         Raises:
-            UnitFailure: a unit did not start.
+            InvalidInput: `options` has some; there are none. UnitFailure: a unit did not start.
         """
+        if options:
+            raise InvalidInput(
+                f"options = {options!r:.60}: an episode has none; parameters are those of the environment"
+            )
         super().reset(seed=seed, options=options)
         drawn = int(self.np_random.integers(_SEEDS)) if seed is None else whole_number("seed", seed)
         self.close()

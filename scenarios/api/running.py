@@ -13,6 +13,7 @@ from handover.scenarios.api.arguments import (
     errors_for_python,
     exact,
     exact_time,
+    flag,
     formats_of,
     master_options,
     merged,
@@ -96,7 +97,8 @@ def run(
         RecordNotWritten: the disk is full.
     """
     with errors_for_python(named, run), contextlib.ExitStack() as opened:
-        if report:
+        shown = flag("progress", progress)
+        if flag("report", report):
             require_extra("reports", "reports", "report=False")
         request = RunRequest(
             subject=str(subject) if isinstance(subject, Path) else subject,
@@ -113,11 +115,11 @@ def run(
             recorded=several_texts("record", record),
             every=exact("checkpoint", checkpoint),
             options=master_options(options, algorithm, isolate),
-            presented=report,
+            presented=bool(report),
         )
         with interruption_in_python() as interruption:
             task = request.task(opened)
-            with bar(progress) as move:
+            with bar(shown) as move:
                 run_task(task, lambda t, end: move(t, end, f"{t:.1f} of at most {end:.0f} s simulated"), interruption)
         if interruption.asked:
             raise KeyboardInterrupt(f"the run was interrupted; what was recorded is in {task.folder.shown}")
@@ -166,7 +168,7 @@ def environment(
             subject=scenario,
             parameters=single_texts(scenario, merged(parameters, named)),
             units=unit_texts(units),
-            options=options or MasterOptions(),
+            options=master_options(MasterOptions() if options is None else options, None),
         )
     return ScenarioEnvironment(request, place, actions, observations, reward, period)
 

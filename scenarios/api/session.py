@@ -375,7 +375,7 @@ def open(  # noqa: A001 (handover.open is named like it)
             start=exact_time("start", start),
             endless=endless,
             step=exact("step", step),
-            options=master_options(options or MasterOptions(), algorithm, isolate),
+            options=master_options(MasterOptions() if options is None else options, algorithm, isolate),
         )
         request.check_options()
         asked = request.open(opened)

@@ -16,6 +16,7 @@ from handover.scenarios.api.arguments import (
     errors_for_python,
     exact,
     exact_time,
+    flag,
     master_options,
     merged,
     of_type,
@@ -31,7 +32,7 @@ from handover.scenarios.api.progress import bar
 from handover.scenarios.campaign.campaign import run_campaign
 from handover.scenarios.campaign.folder import CampaignFolder, default_folder
 from handover.scenarios.campaign.grid import parse_grid, set_parameters, split_units, vary_units
-from handover.scenarios.campaign.plan import CampaignPlan
+from handover.scenarios.campaign.plan import MAX_RUNS, CampaignPlan
 from handover.scenarios.campaign.plan_check import prepared
 from handover.scenarios.campaign.pool_config import LazyPool, PoolConfig
 from handover.scenarios.campaign.worker_pool import RunCounts
@@ -123,6 +124,7 @@ def sweep(
         experiment = experiment_type(name, common.start, common.stop, common.step, common.inputs)
         declared = experiment.parameters() if (settable := settable_of(experiment)) is None else settable.ports.values()
         shapes = {v.name: v.shape for v in declared}
+        _refuse_too_many(given)
         varied = {name: value for name, value in given.items() if _is_varied(value, shapes.get(name, ()))}
         texts = [f"{name}={_values_text(value, shapes.get(name, ()))}" for name, value in varied.items()]
         kept_units, choices = split_units(experiment, common.units)
@@ -134,7 +136,7 @@ def sweep(
             fixed=set_parameters(experiment, fixed, points),
             repetitions=whole_number("seeds", seeds, 1),
             seed=common.seed,
-            paired=paired,
+            paired=flag("paired", paired),
             units=kept_units,
             varied_units=tuple(choices),
             options=master_options(options, algorithm, isolate),
@@ -144,7 +146,7 @@ def sweep(
             inputs=common.inputs,
             recorded=several_texts("record", record),
         )
-        return _carried_out(plan, path_or_none("out", out), pool, progress)
+        return _carried_out(plan, path_or_none("out", out), pool, flag("progress", progress))
 
 
 def _name_of(scenario: object) -> str:
@@ -183,11 +185,23 @@ def _carried_out(plan: CampaignPlan, out: Path | None, workers: PoolConfig, show
     return Campaign(folder.path)
 
 
+def _refuse_too_many(given: Mapping[str, Any]) -> None:
+    """Refuse lists of more values than runs can be planned, before they are spelled out: a range may be a typing error.
+
+    Raises:
+        InvalidInput: there are some.
+    """
+    lists = {n: v for n, v in given.items() if isinstance(v, (Sequence, np.ndarray)) and not isinstance(v, str)}
+    many = [n for n, v in lists.items() if getattr(v, "ndim", 1) and len(v[: MAX_RUNS + 1]) > MAX_RUNS]
+    if many:
+        raise InvalidInput(f"{', '.join(many)}: too many values; at most {MAX_RUNS:,} runs can be planned")
+
+
 def _is_varied(value: Any, shape: tuple[int, ...]) -> bool:
     """Return whether a value is a list of values of a parameter of this shape, and not one value."""
     if isinstance(value, str) or not isinstance(value, (Sequence, np.ndarray)):
         return False
-    return np.ndim(cast(Any, value)) > len(shape) or not len(cast(Any, value))
+    return np.ndim(cast(Any, value)) > len(shape) or not np.size(cast(Any, value))
 
 
 def _values_text(values: Any, shape: tuple[int, ...]) -> str:

@@ -117,6 +117,8 @@ def test_a_bad_action_is_refused(wording: Wording):
     env = handover.environment("ir_grasp", place="reflex")
     with pytest.raises(RuntimeError, match="call reset first"):
         env.step({})
+    with pytest.raises(handover.InvalidInput, match="an episode has none"):
+        env.reset(options={"strategy": "blind"})
     env.reset(seed=0)
     actions: list[Any] = [3, {"yaw_cmd": 0.0}, {"p_WH_cmd": np.zeros(2), "yaw_cmd": 0.0, "sigma_cmd": 2.0}]
     for action in actions:
