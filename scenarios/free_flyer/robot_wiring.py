@@ -251,15 +251,20 @@ def wired_push(
         seed: of the navigation's noise.
         controller: parameters of the controller, and its goal, besides what it knows of delays.
         robot: parameters of the robot.
+
+    Raises:
+        InvalidParameter: a force is given of a twist, or a torque of a push.
     """
-    s = System()
+    is_force, s = p.kind is Wrench.FORCE, System()
+    idle = "torque" if is_force else "force"
+    if getattr(p, idle) != getattr(type(p)(), idle):
+        raise InvalidParameter([f"{idle}: it is that of kind={idle} alone"])
     lateness: dict[str, Any] = {
         "delay": p.delay + p.navigation_delay if p.delay_known else 0.0,
         "lag": expected_lag(p.propulsion),
     }
     impedance = s.add("impedance", fmu("impedance"), **lateness, **controller, active=True)
     thrusters = s.add("thrusters", fmu("thrusters"), **thruster_settings(p.propulsion, p.delay, p.stuck_nozzle))
-    is_force = p.kind is Wrench.FORCE
     pushed: dict[str, Any] = {"force": p.force if is_force else 0.0, "torque": 0.0 if is_force else p.torque}
     note_own_limits(s, impedance, p.propulsion)
     push = s.add("push", fmu("push"), axis=p.axis.name.lower(), **pushed, start=p.begin, duration=p.duration)
