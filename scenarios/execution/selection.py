@@ -62,6 +62,8 @@ def _path_fault(name: str) -> str:
     if path.is_dir():
         return folder_fault(path)
     if path.exists():
+        if path.suffix.lower() in (".fmu", ".ssp", ".ssd"):
+            return "a file, and no scenario, whose name is right here; `handover list` lists those"
         return "a file, and no scenario; what can be run ends with .fmu, .ssp or .ssd"
     is_meant = "/" in name or "\\" in name or (":" not in name and path.suffix)
     return nothing_at(path) if is_meant else ""

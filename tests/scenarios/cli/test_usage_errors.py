@@ -143,6 +143,7 @@ export ir_grasp --ssp a.ssp -p standof=1
 export ir_grasp --ssp a.ssp -p strategy=backward
 export ir_grasp --ssp a.ssp --unit reflex=missing.fmu
 export ir_grasp --ssp a.ssp --unit reflexes=a.fmu
+export mass.fmu --ssp a.ssp
 sweep ir_gasp
 sweep my_plan.toml
 sweep x.ssp
