@@ -1,8 +1,8 @@
 """Pages of the site that are made from declarations: units, scenarios, experiments, a run's folder, and the gallery.
 
 `write` leaves Markdown in the site's folder. Ports, parameters, units of measurement and direct feedthrough are what
-the blocks declare, laws their docstrings, the origins of values those of `paper.toml`, and metrics those of runs. What
-has no description stops it: all such names are listed at once.
+the blocks declare, laws their docstrings, and metrics those of runs. What has no description stops it: all such names
+are listed at once.
 """
 
 import enum
@@ -23,10 +23,9 @@ from handover.cosim.blocks.variable import Variable
 from handover.fmus.catalog import UNITS, Entry, import_class
 from handover.fmus.contents.documentation import Row, cited, items, parse, row, seconds
 from handover.fmus.layout import Form
-from handover.scenarios.catalog import SCENARIOS, SYSTEMS, RobotSystem
+from handover.scenarios.catalog import SCENARIOS, SYSTEMS
 from handover.scenarios.experiment.display_unit import unit_symbol
 from handover.scenarios.experiment.experiment import Experiment
-from handover.scenarios.experiment.paper import paper_entry, parameter_origins
 from handover.scenarios.experiment.places import ports_of_place
 
 DOCS = Path(__file__).parent
@@ -64,7 +63,7 @@ def write(folder: Path, runs: Mapping[str, GalleryRun], experiments: Mapping[str
         for name in system.scenarios:
             campaigns = {n: e for n, e in experiments.items() if e.scenario == name}
             given = {"name": name, "run": runs[name], "experiments": campaigns, "metrics": metrics[name]}
-            pages[f"reference/scenarios/{name}"] = ("scenario", {**given, **scenario(SCENARIOS[name], system)})
+            pages[f"reference/scenarios/{name}"] = ("scenario", {**given, **scenario(SCENARIOS[name])})
     for name, experiment in experiments.items():
         doc = parse(inspect.cleandoc(experiment.doc))
         pages[f"reference/experiments/{name}"] = ("experiment", {"name": name, "experiment": experiment, "doc": doc})
@@ -83,14 +82,13 @@ def write(folder: Path, runs: Mapping[str, GalleryRun], experiments: Mapping[str
 def unit(entry: Entry) -> dict[str, Any]:
     """Return what the page of a unit shows."""
     d = describe(import_class(entry.block))
-    package = entry.block.split(".")[2]
     ports = (("Inputs", d.inputs), ("Outputs", d.outputs))
     return {
         "declared": d,
         "doc": parse(with_latex(entry.name, d.doc)),
         "origin": d.module_doc.partition("\n\n")[0],
         "papers": cited("\n".join((d.module_doc, d.doc, *(v.description for v in d.variables)))),
-        "parameters": _rows(package, d.parameters),
+        "parameters": _rows(entry.name, d.parameters),
         "ports": [(title, [row(v, Form.FMI3) for v in variables]) for title, variables in ports],
         "feedthrough": _feedthrough(d),
         "enumerations": [(e.__name__, items(e)) for e in _enumerations(d.variables)],
@@ -99,13 +97,13 @@ def unit(entry: Entry) -> dict[str, Any]:
     }
 
 
-def scenario(kind: type[Experiment[Any]], system: RobotSystem) -> dict[str, Any]:
+def scenario(kind: type[Experiment[Any]]) -> dict[str, Any]:
     """Return what the page of a scenario shows."""
     parameters = kind.parameters()
-    rows = {"the scenario": _rows(system.package, parameters)}
+    rows = {"the scenario": _rows(kind.name, parameters)}
     for place, name in kind.units.items():
         declared = describe(import_class(UNITS[name].block)).parameters
-        rows[f"`{place}`"] = _rows(UNITS[name].block.split(".")[2], declared)
+        rows[f"`{place}`"] = _rows(name, declared)
     assumed = {of: [r.name for r, origin in listed if origin.startswith("assumed")] for of, listed in rows.items()}
     ports = {
         place: [(row(p.declared, Form.FMI3), p.declared.causality.value, p.is_required, p.sentence)
@@ -163,36 +161,25 @@ def _enumerations(variables: Iterable[Variable]) -> list[type[enum.IntEnum]]:
     return list(dict.fromkeys(v.enumeration for v in variables if v.enumeration is not None))
 
 
-_LENSES = {"p_WC": "p_WC", "q_WC": "looked_at", "intrinsics": "intrinsics", "distortion": "distortion"}
-_ENTRIES = {
-    "hand_force_max": ("hand", "force_max"),
-    "guidance": ("hand", "guide_stiffness"),
-    "sensor_noise": ("pictures", "noise"),
-    "threshold_drop": ("delivery", "threshold_drop"),
-    **{f"{n}_{side}": ("camera", entry) for n, entry in _LENSES.items() for side in ("left", "right", "third")},
-}
-"""Group and name of entries of the Helix's `paper.toml` that give parameters of other names."""
-_WITHOUT_ENTRY = {
+_WITHOUT_ORIGIN = {
     "seed": "follows from the run's seed",
     **dict.fromkeys(("hinges", "hinges_dynamic", "substep", "high_frequency_damping"), "numerical"),
-    **dict.fromkeys(("link_2", "link_3", "x_g", "pressure", "method"), "set by the scenarios"),
+    **dict.fromkeys(
+        ("elbow", "link_2", "link_3", "method", "motion", "path", "pressure", "waypoints", "x_0", "x_g"),
+        "set by the scenarios",
+    ),
 }
-"""What is said of parameters that no `paper.toml` has."""
+"""What is said of parameters that declare no origin."""
 
 
-def _rows(package: str, variables: Sequence[Variable]) -> list[tuple[Row, str]]:
+def _rows(of: str, variables: Sequence[Variable]) -> list[tuple[Row, str]]:
     """Return the rows of a table of variables, each with the origin of its value: status and place in the paper.
 
     Raises:
         Undocumented: a parameter has none.
     """
-    entries = parameter_origins(package, variables)
-    if package == "helix":
-        entries |= {v.name: paper_entry(package, *_ENTRIES[v.name]) for v in variables if v.name in _ENTRIES}
-    while referring := {n: m for n, e in entries.items() if (m := re.fullmatch(r"\[(\w+)\] (\w+)", e["where"]))}:
-        entries |= {name: paper_entry(package, m[1], m[2]) for name, m in referring.items()}
-    origins = _WITHOUT_ENTRY | {name: f"{entry['status']}: {entry['where']}" for name, entry in entries.items()}
-    if lacking := [f"origin of {v.name} of {package}" for v in variables if v.name not in origins]:
+    origins = _WITHOUT_ORIGIN | {v.name: str(v.origin) for v in variables if v.origin}
+    if lacking := [f"origin of {v.name} of {of}" for v in variables if v.name not in origins]:
         raise Undocumented(lacking)
     return [(row(v, Form.FMI3), origins[v.name]) for v in variables]
 

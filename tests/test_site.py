@@ -118,9 +118,11 @@ def test_what_has_no_description_is_named(what: str, monkeypatch: pytest.MonkeyP
 
 
 def test_a_value_without_an_origin_is_named(monkeypatch: pytest.MonkeyPatch):
-    pages = maker("declared_pages")
-    monkeypatch.setattr(pages, "parameter_origins", Mock(return_value={}))
-    with pytest.raises(maker("undocumented").Undocumented, match="origin of axis of free_flyer; origin of force"):
+    pages, shown = maker("declared_pages"), describe(import_class(UNITS["Push"].block))
+    axis = dataclasses.replace(shown.parameters[0], origin=None)
+    lacking = dataclasses.replace(shown, parameters=(axis, *shown.parameters[1:]))
+    monkeypatch.setattr(pages, "describe", Mock(return_value=lacking))
+    with pytest.raises(maker("undocumented").Undocumented, match="origin of axis of Push"):
         pages.unit(UNITS["Push"])
 
 

@@ -14,6 +14,7 @@ from handover.controllers.free_flyer.ports import Behaviour, Inputs, unit_quater
 from handover.controllers.free_flyer.sampled_loop import LinearController, SampledLoop
 from handover.controllers.free_flyer.virtual_body import VirtualBody, admittance_law
 from handover.controllers.free_flyer.wrench_observer import ThrustModel, WrenchObserver
+from handover.cosim.blocks.origins import assumed
 from handover.cosim.blocks.plain_rotation import (
     ZERO,
     Matrix,
@@ -53,18 +54,58 @@ class Params(impedance_controller.Params, LimitParams):
     """
 
     inertia_ratio: Number = parameter(
-        1.0, "virtual mass and inertia over the robot's own (assumed)", minimum=0.05, maximum=20.0
+        1.0,
+        "virtual mass and inertia over the robot's own (assumed)",
+        minimum=0.05,
+        maximum=20.0,
+        origin=assumed("the virtual body is as heavy as the robot"),
     )
     observer_rate: PerSecond = parameter(
-        10.0, "at which the estimated wrench converges (assumed)", minimum=0.1, maximum=1000.0
+        10.0,
+        "at which the estimated wrench converges (assumed)",
+        minimum=0.1,
+        maximum=1000.0,
+        origin=assumed("ten times as fast as the virtual body moves"),
     )
-    k_x: PerSecond2 = parameter(9.0, "inner loop: acceleration per position error (assumed)", minimum=0.0, maximum=1e4)
-    k_v: PerSecond = parameter(6.0, "inner loop: acceleration per velocity error (assumed)", minimum=0.0, maximum=1e4)
+    k_x: PerSecond2 = parameter(
+        9.0,
+        "inner loop: acceleration per position error (assumed)",
+        minimum=0.0,
+        maximum=1e4,
+        origin=assumed(
+            "tracks a step of the virtual body's force in half a second, and leaves two thirds of the "
+            "weakest thrust to it"
+        ),
+    )
+    k_v: PerSecond = parameter(
+        6.0,
+        "inner loop: acceleration per velocity error (assumed)",
+        minimum=0.0,
+        maximum=1e4,
+        origin=assumed(
+            "tracks a step of the virtual body's force in half a second, and leaves two thirds of the "
+            "weakest thrust to it"
+        ),
+    )
     k_R: PerSecond2 = parameter(
-        16.0, "inner loop: angular acceleration per attitude error (assumed)", minimum=0.0, maximum=1e4
+        16.0,
+        "inner loop: angular acceleration per attitude error (assumed)",
+        minimum=0.0,
+        maximum=1e4,
+        origin=assumed(
+            "tracks a step of the virtual body's force in half a second, and leaves two thirds of the "
+            "weakest thrust to it"
+        ),
     )
     k_w: PerSecond = parameter(
-        8.0, "inner loop: angular acceleration per rate error (assumed)", minimum=0.0, maximum=1e4
+        8.0,
+        "inner loop: angular acceleration per rate error (assumed)",
+        minimum=0.0,
+        maximum=1e4,
+        origin=assumed(
+            "tracks a step of the virtual body's force in half a second, and leaves two thirds of the "
+            "weakest thrust to it"
+        ),
     )
 
     def inner_gains(self, factor: float = 1.0) -> tuple[PidGains, PidGains]:

@@ -16,6 +16,7 @@ from handover.controllers.free_flyer.ports import Inputs as BaseInputs
 from handover.controllers.free_flyer.ports import Outputs as BaseOutputs
 from handover.controllers.free_flyer.sampled_loop import SampledLoop
 from handover.cosim.blocks.geometry import quaternion_of, rotation_of
+from handover.cosim.blocks.origins import assumed, derived, stated
 from handover.cosim.blocks.plain_rotation import quaternion, rotation_vector
 from handover.cosim.blocks.ports import Floats, Matrix3, Vector3, output, parameter, port
 from handover.cosim.blocks.units import (
@@ -42,41 +43,113 @@ class Params(GainParams):
     """
 
     behaviour: Behaviour = parameter(
-        Behaviour.RIGID, "gains of [Fernandes2020] table 4.1 but rotational k_B, or CUSTOM for the four matrices below"
+        Behaviour.RIGID,
+        "gains of [Fernandes2020] table 4.1 but rotational k_B, or CUSTOM for the four matrices below",
+        origin=stated("table 4.1"),
     )
     rotational_damping: NewtonMetreSecondPerRadian = parameter(
-        1.0, "rotational k_B unless CUSTOM: table 4.1's 5 of RIGID is unstable with light links", minimum=0.0
+        1.0,
+        "rotational k_B unless CUSTOM: table 4.1's 5 of RIGID is unstable with light links",
+        minimum=0.0,
+        origin=assumed("table 4.1, compliant; the rigid setting's 5 is unstable with light links"),
     )
     damping_rotation: Matrix3[NewtonMetreSecondPerRadian] = parameter(
-        np.eye(3), "CUSTOM: rotational k_B, in the goal's axes"
+        np.eye(3), "CUSTOM: rotational k_B, in the goal's axes", origin=stated("table 4.1, compliant")
     )
-    q_J_goal: Vector3[Radian] = parameter(np.zeros(3), "the joints' posture", minimum=-7.0, maximum=7.0)
+    q_J_goal: Vector3[Radian] = parameter(
+        np.zeros(3),
+        "the joints' posture",
+        minimum=-7.0,
+        maximum=7.0,
+        origin=assumed("the arm straight ahead, as the thesis fixes it"),
+    )
     null_frequency: RadianPerSecond = parameter(
-        0.5, "frequency with which the joints go back to their posture", minimum=0.01, maximum=100.0
+        0.5,
+        "frequency with which the joints go back to their posture",
+        minimum=0.01,
+        maximum=100.0,
+        origin=assumed("slow beside the gripper's motion, which it must not disturb"),
     )
-    null_damping: Number = parameter(1.0, "damping ratio of that motion", minimum=0.0, maximum=100.0)
-    joints: int = parameter(2, "number of the arm's joints", minimum=0, maximum=3)
-    mass: Kilogram = parameter(MASS, "mass of the base", minimum=0.0, maximum=1e4)
-    I_B: Matrix3[KilogramMetre2] = parameter(INERTIA, "inertia of the base about its centre of mass, in B")
-    p_BG: Vector3[Metre] = parameter(ARM, "gripper with all angles zero, seen from B", minimum=-5.0, maximum=5.0)
+    null_damping: Number = parameter(
+        1.0, "damping ratio of that motion", minimum=0.0, maximum=100.0, origin=assumed("critical damping")
+    )
+    joints: int = parameter(
+        2,
+        "number of the arm's joints",
+        minimum=0,
+        maximum=3,
+        origin=stated("Astrobee's perching arm"),
+    )
+    mass: Kilogram = parameter(
+        MASS,
+        "mass of the base",
+        minimum=0.0,
+        maximum=1e4,
+        origin=stated("Astrobee; the thesis prints 10 kg (sec. 2.1.1)"),
+    )
+    I_B: Matrix3[KilogramMetre2] = parameter(
+        INERTIA, "inertia of the base about its centre of mass, in B", origin=stated("Astrobee")
+    )
+    p_BG: Vector3[Metre] = parameter(
+        ARM,
+        "gripper with all angles zero, seen from B",
+        minimum=-5.0,
+        maximum=5.0,
+        origin=assumed("not given: Astrobee's arm stretched out"),
+    )
     axis_J: Matrix3[Number] = parameter(
         np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]),
         "axes of the joints, a row each, in B, of any length",
+        origin=derived(
+            "Astrobee's description of its perching arm: stretched out, the proximal joint tilts, the "
+            "distal one pans; a third joint is assumed"
+        ),
     )
     link: Matrix3[Metre] = parameter(
         np.array([[-0.10, 0.0, 0.0], [-0.08, 0.0, 0.0], [-0.04, 0.0, 0.0]]),
         "links, a row each, in B with all angles zero",
+        origin=assumed(
+            "Astrobee's description of its perching arm: the proximal link; from the distal joint to "
+            "where the fingers hold, and a third link, assumed"
+        ),
     )
-    centre_L: Vector3[Number] = parameter(np.full(3, 0.5), "where along its link a link's centre of mass is")
-    mass_L: Vector3[Kilogram] = parameter(np.array([0.1623, 0.2178, 0.1145]), "masses of the links")
+    centre_L: Vector3[Number] = parameter(
+        np.full(3, 0.5),
+        "where along its link a link's centre of mass is",
+        origin=assumed("not given: the middles of the links"),
+    )
+    mass_L: Vector3[Kilogram] = parameter(
+        np.array([0.1623, 0.2178, 0.1145]),
+        "masses of the links",
+        origin=derived(
+            "Astrobee's description of its perching arm: the proximal link, the distal one with the "
+            "fingers, and the fingers alone for a third"
+        ),
+    )
     I_L: Matrix3[KilogramMetre2] = parameter(
-        np.array([[0.02705] * 3, [0.013525] * 3, [0.01082] * 3]), "principal moments of the links, a row each"
+        np.array([[0.02705] * 3, [0.013525] * 3, [0.01082] * 3]),
+        "principal moments of the links, a row each",
+        origin=derived("Astrobee's description of its perching arm: its links' moments of inertia, the fingers' added"),
     )
-    rotor_J: Vector3[KilogramMetre2] = parameter(np.zeros(3), "inertia of the drives' rotors about the joints")
+    rotor_J: Vector3[KilogramMetre2] = parameter(
+        np.zeros(3),
+        "inertia of the drives' rotors about the joints",
+        origin=assumed("not given: the links' moments in Astrobee's description are large enough to have them"),
+    )
     delay: Second = parameter(
-        0.0, "expected time from a measurement to its commands' arrival at base and joints", minimum=0.0, maximum=0.2
+        0.0,
+        "expected time from a measurement to its commands' arrival at base and joints",
+        minimum=0.0,
+        maximum=0.2,
+        origin=assumed("not given"),
     )
-    lag: Second = parameter(0.02, "expected time constant of the propulsion (assumed)", minimum=0.0, maximum=2.0)
+    lag: Second = parameter(
+        0.02,
+        "expected time constant of the propulsion (assumed)",
+        minimum=0.0,
+        maximum=2.0,
+        origin=assumed("as the thrusters have it"),
+    )
 
     def model(self) -> ArmModel:
         """Return the robot's model of itself."""

@@ -11,6 +11,7 @@ import numpy as np
 from handover.controllers.free_flyer.body import FlyerBody
 from handover.controllers.free_flyer.gains import ImpedanceGains
 from handover.controllers.free_flyer.ports import ARM, INERTIA, MASS, PERIOD, TERMINALS, Behaviour
+from handover.cosim.blocks.origins import assumed, derived, stated
 from handover.cosim.blocks.ports import Matrix3, Vector3, parameter
 from handover.cosim.blocks.terminals import Terminal
 from handover.cosim.blocks.units import (
@@ -71,13 +72,31 @@ class GripperController(SampledController[U, Y]):
 class RobotParams:
     """What a robot whose joints are fixed knows of itself and its propulsion."""
 
-    mass: Kilogram = parameter(MASS, "mass of the robot", minimum=0.0, maximum=1e4)
-    I_B: Matrix3[KilogramMetre2] = parameter(INERTIA, "inertia about the centre of mass, in B")
-    p_BG: Vector3[Metre] = parameter(ARM, "gripper, seen from the centre of mass (assumed)", minimum=-5.0, maximum=5.0)
-    delay: Second = parameter(
-        0.0, "expected time from a measurement to its command's arrival at the propulsion", minimum=0.0, maximum=0.2
+    mass: Kilogram = parameter(MASS, "mass of the robot", minimum=0.0, maximum=1e4, origin=stated("Astrobee"))
+    I_B: Matrix3[KilogramMetre2] = parameter(
+        INERTIA, "inertia about the centre of mass, in B", origin=stated("Astrobee")
     )
-    lag: Second = parameter(0.02, "expected time constant of the propulsion (assumed)", minimum=0.0, maximum=2.0)
+    p_BG: Vector3[Metre] = parameter(
+        ARM,
+        "gripper, seen from the centre of mass (assumed)",
+        minimum=-5.0,
+        maximum=5.0,
+        origin=assumed("not given: Astrobee's arm stretched out"),
+    )
+    delay: Second = parameter(
+        0.0,
+        "expected time from a measurement to its command's arrival at the propulsion",
+        minimum=0.0,
+        maximum=0.2,
+        origin=assumed("not given"),
+    )
+    lag: Second = parameter(
+        0.02,
+        "expected time constant of the propulsion (assumed)",
+        minimum=0.0,
+        maximum=2.0,
+        origin=assumed("as the thrusters have it"),
+    )
 
     def body(self) -> FlyerBody:
         """Return the robot's model of itself."""
@@ -89,10 +108,18 @@ class LimitParams:
     """Limits of the propulsion, to which commands are clipped."""
 
     f_max: Vector3[Newton] = parameter(
-        np.array([0.55, 0.39, 0.45]), "largest force, along the axes of B", minimum=0.0, maximum=1e4
+        np.array([0.55, 0.39, 0.45]),
+        "largest force, along the axes of B",
+        minimum=0.0,
+        maximum=1e4,
+        origin=stated("Astrobee, about"),
     )
     tau_max: Vector3[NewtonMetre] = parameter(
-        np.array([0.064, 0.040, 0.075]), "largest torque, about the axes of B", minimum=0.0, maximum=1e4
+        np.array([0.064, 0.040, 0.075]),
+        "largest torque, about the axes of B",
+        minimum=0.0,
+        maximum=1e4,
+        origin=stated("Astrobee, about"),
     )
 
 
@@ -101,19 +128,25 @@ class GainParams:
     """Gains of [Fernandes2020] table 4.1, or custom ones."""
 
     behaviour: Behaviour = parameter(
-        Behaviour.RIGID, "gains of [Fernandes2020] table 4.1, or CUSTOM for the four matrices below"
+        Behaviour.RIGID,
+        "gains of [Fernandes2020] table 4.1, or CUSTOM for the four matrices below",
+        origin=stated("table 4.1"),
     )
     stiffness_translation: Matrix3[NewtonPerMetre] = parameter(
-        7.0 * MASS * np.eye(3), "CUSTOM: linear k_D, in the goal's axes"
+        7.0 * MASS * np.eye(3),
+        "CUSTOM: linear k_D, in the goal's axes",
+        origin=derived("table 4.1, rigid: 7 times the mass"),
     )
     damping_translation: Matrix3[NewtonSecondPerMetre] = parameter(
-        15.0 * np.eye(3), "CUSTOM: linear k_B, in the goal's axes"
+        15.0 * np.eye(3), "CUSTOM: linear k_B, in the goal's axes", origin=stated("table 4.1, rigid")
     )
     stiffness_rotation: Matrix3[NewtonMetrePerRadian] = parameter(
-        70.0 * INERTIA, "CUSTOM: rotational k_D, in the goal's axes"
+        70.0 * INERTIA,
+        "CUSTOM: rotational k_D, in the goal's axes",
+        origin=derived("table 4.1, rigid: 70 times the inertia"),
     )
     damping_rotation: Matrix3[NewtonMetreSecondPerRadian] = parameter(
-        5.0 * np.eye(3), "CUSTOM: rotational k_B, in the goal's axes"
+        5.0 * np.eye(3), "CUSTOM: rotational k_B, in the goal's axes", origin=stated("table 4.1, rigid")
     )
 
     def custom_gains(self) -> ImpedanceGains:

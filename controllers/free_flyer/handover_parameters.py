@@ -7,6 +7,7 @@ import numpy as np
 
 from handover.controllers.free_flyer.ports import ARM, Behaviour, unit_quaternion
 from handover.cosim.blocks.block import InvalidParameters
+from handover.cosim.blocks.origins import assumed, derived, stated
 from handover.cosim.blocks.plain_rotation import rotate, rotation_matrix, vector
 from handover.cosim.blocks.ports import Floats, Vector3, Vector4, parameter
 from handover.cosim.blocks.units import Metre, MetrePerSecond, MetrePerSecond2, Number, Radian, Second
@@ -37,84 +38,173 @@ class Params:
     """Places, thresholds and times; velocities, angle and handover place as stated, all else assumed."""
 
     task: HandoverTask = parameter(
-        HandoverTask.HOLD, "HOLD stays at the handover place and yields; COLLABORATIVE gives, waits there, and receives"
+        HandoverTask.HOLD,
+        "HOLD stays at the handover place and yields; COLLABORATIVE gives, waits there, and receives",
+        origin=assumed("sec. 5.5; hold is for trying the impedance control"),
     )
-    behaviour: Behaviour = parameter(Behaviour.RIGID, "behaviour that the velocities below are for")
+    behaviour: Behaviour = parameter(
+        Behaviour.RIGID, "behaviour that the velocities below are for", origin=stated("table 4.1")
+    )
     release_velocity: MetrePerSecond = parameter(
-        0.0, "speed of the gripper above which it is pulled; 0: as stated for the behaviour", minimum=0.0, maximum=10.0
+        0.0,
+        "speed of the gripper above which it is pulled; 0: as stated for the behaviour",
+        minimum=0.0,
+        maximum=10.0,
+        origin=stated("0 stands for published.velocity_hand by behaviour, sec. 4.1.2"),
     )
     receive_velocity: MetrePerSecond = parameter(
-        0.0, "speed above which an object is put into it; 0: as stated for the behaviour", minimum=0.0, maximum=10.0
+        0.0,
+        "speed above which an object is put into it; 0: as stated for the behaviour",
+        minimum=0.0,
+        maximum=10.0,
+        origin=stated("0 stands for published.velocity_gripper by behaviour, sec. 4.1.2"),
     )
     angle_threshold: Radian = parameter(
-        0.71, "gripper angle above which a closed gripper holds something", minimum=0.0, maximum=6.3
+        0.71,
+        "gripper angle above which a closed gripper holds something",
+        minimum=0.0,
+        maximum=6.3,
+        origin=stated("sec. 4.1.2, beta"),
     )
-    p_WG_handover: Vector3[Metre] = parameter(np.array([0.0, -0.07, 0.0]), "where the gripper hands over")
-    q_WG_handover: Vector4[Number] = parameter(np.array([1.0, 0.0, 0.0, 0.0]), "its orientation there")
-    p_WO_0: Vector3[Metre] = parameter(np.array([-0.10, -0.57, 0.0]), "where the object is fetched: its centre")
+    p_WG_handover: Vector3[Metre] = parameter(
+        np.array([0.0, -0.07, 0.0]), "where the gripper hands over", origin=stated("sec. 4.1.3, 4.3.1")
+    )
+    q_WG_handover: Vector4[Number] = parameter(
+        np.array([1.0, 0.0, 0.0, 0.0]), "its orientation there", origin=stated("sec. 4.3.1: 0 orientation in all axes")
+    )
+    p_WO_0: Vector3[Metre] = parameter(
+        np.array([-0.10, -0.57, 0.0]), "where the object is fetched: its centre", origin=assumed("not given")
+    )
     p_OG: Vector3[Metre] = parameter(
         np.array([0.0, -0.07, 0.0]),
         "where it is gripped, seen from its centre, in the world",
         minimum=-1.0,
         maximum=1.0,
+        origin=derived("as handover_place.p_OG"),
     )
-    q_WG_object: Vector4[Number] = parameter(np.array([1.0, 0.0, 0.0, 0.0]), "orientation of the gripper at the object")
+    q_WG_object: Vector4[Number] = parameter(
+        np.array([1.0, 0.0, 0.0, 0.0]), "orientation of the gripper at the object", origin=assumed("not given")
+    )
     approach: Metre = parameter(
         0.15,
         "length of the straight approach to the object, along -x of G",
         minimum=0.0,
         maximum=5.0,
+        origin=assumed("not given"),
     )
-    p_WG_retreat: Vector3[Metre] = parameter(np.array([0.40, -0.07, 0.0]), "where the gripper retreats to")
-    p_BG: Vector3[Metre] = parameter(ARM, "gripper, seen from the centre of mass", minimum=-5.0, maximum=5.0)
+    p_WG_retreat: Vector3[Metre] = parameter(
+        np.array([0.40, -0.07, 0.0]), "where the gripper retreats to", origin=assumed("not given")
+    )
+    p_BG: Vector3[Metre] = parameter(
+        ARM,
+        "gripper, seen from the centre of mass",
+        minimum=-5.0,
+        maximum=5.0,
+        origin=assumed("not given: Astrobee's arm stretched out"),
+    )
     workspace_low: Vector3[Metre] = parameter(
-        np.array([-0.30, -1.5, -1.5]), "smallest coordinates of gripper and robot: the person is beyond, at -x"
+        np.array([-0.30, -1.5, -1.5]),
+        "smallest coordinates of gripper and robot: the person is beyond, at -x",
+        origin=assumed("not given"),
     )
-    workspace_high: Vector3[Metre] = parameter(np.array([2.0, 1.5, 1.5]), "largest coordinates of gripper and robot")
+    workspace_high: Vector3[Metre] = parameter(
+        np.array([2.0, 1.5, 1.5]), "largest coordinates of gripper and robot", origin=assumed("not given")
+    )
     gated: bool = parameter(
-        True, "it yields, signals and heeds the speed only once at rest; else as soon as it is within gate_error"
+        True,
+        "it yields, signals and heeds the speed only once at rest; else as soon as it is within gate_error",
+        origin=assumed("not given: fig. 3.1 has no condition of rest between arrival, impedance control and signal"),
     )
     gate_error: Metre = parameter(
-        0.05, "distance from the handover place below which impedance control may begin", minimum=1e-4, maximum=10.0
+        0.05,
+        "distance from the handover place below which impedance control may begin",
+        minimum=1e-4,
+        maximum=10.0,
+        origin=assumed("not given"),
     )
-    gate_speed: MetrePerSecond = parameter(0.01, "speed below which the gripper is at rest", minimum=1e-4, maximum=10.0)
+    gate_speed: MetrePerSecond = parameter(
+        0.01, "speed below which the gripper is at rest", minimum=1e-4, maximum=10.0, origin=assumed("not given")
+    )
     tolerance: Metre = parameter(
-        0.01, "distance from the goal at which it has arrived, and at which it signals", minimum=1e-4, maximum=10.0
+        0.01,
+        "distance from the goal at which it has arrived, and at which it signals",
+        minimum=1e-4,
+        maximum=10.0,
+        origin=assumed("not given"),
     )
-    tolerance_angle: Radian = parameter(0.05, "angle at which it has arrived anywhere", minimum=1e-3, maximum=3.2)
-    settle_time: Second = parameter(0.5, "time at rest and in place that makes it arrived", minimum=0.0, maximum=60.0)
-    gripper_time: Second = parameter(1.0, "time that opening or closing takes", minimum=0.0, maximum=60.0)
-    signal_time: Second = parameter(1.0, "time that the light is on", minimum=0.0, maximum=60.0)
+    tolerance_angle: Radian = parameter(
+        0.05, "angle at which it has arrived anywhere", minimum=1e-3, maximum=3.2, origin=assumed("not given")
+    )
+    settle_time: Second = parameter(
+        0.5, "time at rest and in place that makes it arrived", minimum=0.0, maximum=60.0, origin=assumed("not given")
+    )
+    gripper_time: Second = parameter(
+        1.0, "time that opening or closing takes", minimum=0.0, maximum=60.0, origin=assumed("not given")
+    )
+    signal_time: Second = parameter(
+        1.0, "time that the light is on", minimum=0.0, maximum=60.0, origin=assumed("not given")
+    )
     pause: Second = parameter(
-        4.0, "COLLABORATIVE: time from the release to the next signal, at least", minimum=0.0, maximum=600.0
+        4.0,
+        "COLLABORATIVE: time from the release to the next signal, at least",
+        minimum=0.0,
+        maximum=600.0,
+        origin=assumed("not given"),
     )
-    filter_time: Second = parameter(0.08, "time constant of the velocity's low-pass", minimum=0.0, maximum=10.0)
+    filter_time: Second = parameter(
+        0.08, "time constant of the velocity's low-pass", minimum=0.0, maximum=10.0, origin=assumed("not given")
+    )
     gradual: bool = parameter(
-        False, "the fingers follow pull and push on the way to the threshold, and back, instead of waiting for it"
+        False,
+        "the fingers follow pull and push on the way to the threshold, and back, instead of waiting for it",
+        origin=derived("sec. 6.3 proposes it; sec. 3.1.2 opens the gripper at the threshold"),
     )
     gradual_share: Number = parameter(
-        0.5, "gradual: part of the threshold above which they follow the speed", minimum=0.0, maximum=0.95
+        0.5,
+        "gradual: part of the threshold above which they follow the speed",
+        minimum=0.0,
+        maximum=0.95,
+        origin=assumed("not given"),
     )
     pull_acceleration: MetrePerSecond2 = parameter(
-        0.15, "gradual: acceleration above which the gripper is pulled: thrust gives less", minimum=0.0, maximum=100.0
+        0.15,
+        "gradual: acceleration above which the gripper is pulled: thrust gives less",
+        minimum=0.0,
+        maximum=100.0,
+        origin=assumed("not given: Astrobee's thrust accelerates the gripper by less than 0.13 m/s2"),
     )
     braking: MetrePerSecond2 = parameter(
-        0.03, "gradual: deceleration at which a pull has ended: thrust gives more", minimum=0.0, maximum=100.0
+        0.03,
+        "gradual: deceleration at which a pull has ended: thrust gives more",
+        minimum=0.0,
+        maximum=100.0,
+        origin=assumed("not given: less than thrust brakes it by"),
     )
     free_angle: Radian = parameter(
         0.25,
         "gradual, verify: how far they open from what they hold until it is free for certain",
         minimum=0.0,
         maximum=3.0,
+        origin=assumed("not given: more than person.release_angle"),
     )
     verify: bool = parameter(
-        False, "after a release the fingers close once more: where they hold something, it was not taken"
+        False,
+        "after a release the fingers close once more: where they hold something, it was not taken",
+        origin=assumed("not given: sec. 3.2 takes what was released for delivered"),
     )
     verify_wait: Second = parameter(
-        0.1, "verify: time from the object's being free to their closing", minimum=0.0, maximum=60.0
+        0.1,
+        "verify: time from the object's being free to their closing",
+        minimum=0.0,
+        maximum=60.0,
+        origin=assumed("not given"),
     )
-    attempts: int = parameter(5, "failed receptions, or deliveries, before it gives up", minimum=1, maximum=1000)
-    patience: Second = parameter(60.0, "time in a phase before it gives up", minimum=0.1, maximum=1e5)
+    attempts: int = parameter(
+        5, "failed receptions, or deliveries, before it gives up", minimum=1, maximum=1000, origin=assumed("not given")
+    )
+    patience: Second = parameter(
+        60.0, "time in a phase before it gives up", minimum=0.1, maximum=1e5, origin=assumed("not given")
+    )
 
     def velocities(self) -> tuple[float, float]:
         """Return the thresholds for release and reception; 0 for one that is neither given nor stated."""

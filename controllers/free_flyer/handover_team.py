@@ -20,6 +20,7 @@ from handover.controllers.free_flyer.handover_state_machine import Outputs as Ro
 from handover.controllers.free_flyer.ports import unit_quaternion
 from handover.controllers.free_flyer.velocity_monitor import VelocityMonitor
 from handover.cosim.blocks.block import InvalidParameters
+from handover.cosim.blocks.origins import assumed, derived
 from handover.cosim.blocks.plain_rotation import (
     ZERO,
     Vector,
@@ -55,23 +56,38 @@ class Params(handover_parameters.Params):
     """Those of one robot, whose places here are where the middle between both grippers goes; all are assumed."""
 
     p_WG_handover: Vector3[Metre] = parameter(
-        np.array([0.28, 0.0, 0.0]), "where the middle between the grippers hands over"
+        np.array([0.28, 0.0, 0.0]),
+        "where the middle between the grippers hands over",
+        origin=assumed("sec. 6.3 proposes two robots with a larger object, and gives no values"),
     )
-    p_WO_0: Vector3[Metre] = parameter(np.array([0.10, -0.80, 0.0]), "where the object is fetched: its centre")
+    p_WO_0: Vector3[Metre] = parameter(
+        np.array([0.10, -0.80, 0.0]),
+        "where the object is fetched: its centre",
+        origin=assumed("sec. 6.3 proposes two robots with a larger object, and gives no values"),
+    )
     p_OG: Vector3[Metre] = parameter(
         np.array([0.28, 0.0, 0.0]),
         "middle between the places where it is gripped, seen from its centre, in the world",
         minimum=-2.0,
         maximum=2.0,
+        origin=assumed("sec. 6.3 proposes two robots with a larger object, and gives no values"),
     )
     p_WG_retreat: Vector3[Metre] = parameter(
-        np.array([0.68, 0.0, 0.0]), "where the middle between the grippers retreats to"
+        np.array([0.68, 0.0, 0.0]),
+        "where the middle between the grippers retreats to",
+        origin=assumed("sec. 6.3 proposes two robots with a larger object, and gives no values"),
     )
     grip_spacing: Metre = parameter(
-        0.50, "between the grippers, along y of G; the first robot's is at +y", minimum=_CUBE, maximum=2.0
+        0.50,
+        "between the grippers, along y of G; the first robot's is at +y",
+        minimum=_CUBE,
+        maximum=2.0,
+        origin=assumed("sec. 6.3 proposes two robots with a larger object, and gives no values"),
     )
     together: bool = parameter(
-        True, "they take each step of the handover together, and heed the middle's velocity; else each for itself"
+        True,
+        "they take each step of the handover together, and heed the middle's velocity; else each for itself",
+        origin=derived("sec. 6.3: on two robots where the object could be simultaneously carried"),
     )
 
     @property

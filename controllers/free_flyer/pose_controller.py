@@ -14,6 +14,7 @@ from handover.controllers.free_flyer.ports import (
 )
 from handover.controllers.free_flyer.profile import Bounds, Profile, Reference, profile_between
 from handover.controllers.free_flyer.sampled_loop import SampledLoop
+from handover.cosim.blocks.origins import assumed, stated
 from handover.cosim.blocks.plain_rotation import (
     ZERO,
     Matrix,
@@ -57,21 +58,67 @@ _NAME = "PoseController"
 class Params(RobotParams, LimitParams):
     """Gains of Astrobee's public software; the trajectory's bounds leave half of the weakest thrust for control."""
 
-    k_P: PerSecond2 = parameter(0.6, "acceleration per position error", minimum=0.0, maximum=1e4)
-    k_I: PerSecond3 = parameter(1e-4, "acceleration per integral of the position error", minimum=0.0, maximum=1e4)
-    k_D: PerSecond = parameter(1.2, "acceleration per velocity error", minimum=0.0, maximum=1e4)
-    k_P_R: PerSecond2 = parameter(4.0, "angular acceleration per attitude error", minimum=0.0, maximum=1e4)
-    k_I_R: PerSecond3 = parameter(0.002, "angular acceleration per integral of that", minimum=0.0, maximum=1e4)
-    k_D_R: PerSecond = parameter(3.2, "angular acceleration per rate error", minimum=0.0, maximum=1e4)
-    speed: MetrePerSecond = parameter(0.1, "largest speed of the trajectory (assumed)", minimum=1e-3, maximum=10.0)
+    k_P: PerSecond2 = parameter(
+        0.6, "acceleration per position error", minimum=0.0, maximum=1e4, origin=stated("Astrobee's public software")
+    )
+    k_I: PerSecond3 = parameter(
+        1e-4,
+        "acceleration per integral of the position error",
+        minimum=0.0,
+        maximum=1e4,
+        origin=stated("Astrobee's public software"),
+    )
+    k_D: PerSecond = parameter(
+        1.2, "acceleration per velocity error", minimum=0.0, maximum=1e4, origin=stated("Astrobee's public software")
+    )
+    k_P_R: PerSecond2 = parameter(
+        4.0,
+        "angular acceleration per attitude error",
+        minimum=0.0,
+        maximum=1e4,
+        origin=stated("Astrobee's public software"),
+    )
+    k_I_R: PerSecond3 = parameter(
+        0.002,
+        "angular acceleration per integral of that",
+        minimum=0.0,
+        maximum=1e4,
+        origin=stated("Astrobee's public software"),
+    )
+    k_D_R: PerSecond = parameter(
+        3.2,
+        "angular acceleration per rate error",
+        minimum=0.0,
+        maximum=1e4,
+        origin=stated("Astrobee's public software"),
+    )
+    speed: MetrePerSecond = parameter(
+        0.1,
+        "largest speed of the trajectory (assumed)",
+        minimum=1e-3,
+        maximum=10.0,
+        origin=assumed("not given: bounds of the way that leave thrust for control"),
+    )
     acceleration: MetrePerSecond2 = parameter(
-        0.02, "largest acceleration of the trajectory (assumed)", minimum=1e-4, maximum=100.0
+        0.02,
+        "largest acceleration of the trajectory (assumed)",
+        minimum=1e-4,
+        maximum=100.0,
+        origin=assumed("not given: bounds of the way that leave thrust for control"),
     )
     rate: RadianPerSecond = parameter(
-        0.17, "largest turning rate of the trajectory (assumed)", minimum=1e-3, maximum=10.0
+        0.17,
+        "largest turning rate of the trajectory (assumed)",
+        minimum=1e-3,
+        maximum=10.0,
+        origin=assumed("not given: bounds of the way that leave thrust for control"),
     )
     turning: RadianPerSecond2 = parameter(
-        0.1, "largest angular acceleration of the trajectory (assumed)", minimum=1e-4, maximum=100.0
+        0.1,
+        "largest angular acceleration of the trajectory (assumed)",
+        minimum=1e-4,
+        maximum=100.0,
+        origin=assumed("not given: bounds of the way that leave thrust for control"),
     )
 
     def position_gains(self) -> PidGains:

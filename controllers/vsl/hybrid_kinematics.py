@@ -21,6 +21,7 @@ from handover.controllers.vsl.kinematics import Elbow, VslKinematics
 from handover.controllers.vsl.learned_model import Learned, VslModel
 from handover.controllers.vsl.model_text import InvalidModel, read_model
 from handover.cosim.blocks.block import InvalidParameters
+from handover.cosim.blocks.origins import assumed, derived, stated
 from handover.cosim.blocks.ports import Floats, Vector2, Vector3, output, parameter, port
 from handover.cosim.blocks.start_values import parameter_faults
 from handover.cosim.blocks.state import pack_state, unpack_state
@@ -83,63 +84,153 @@ class Params:
     """Method, model and arm; the lengths are assumed."""
 
     method: Method = parameter(Method.HYBRID, "rigid kinematics, with what was learned, or with its estimate only")
-    learned: Learned = parameter(Learned.CUBIC, "what corrects rigid kinematics")
-    model: str = parameter("", "JSON file of a trained model; empty: the one that ships; no published one does")
-    friction_compensation: bool = parameter(
-        False, "free the currents of gear friction by which way each joint has been turning"
+    learned: Learned = parameter(
+        Learned.CUBIC,
+        "what corrects rigid kinematics",
+        origin=assumed("sec. IV-B has networks; polynomials of third degree learn the same from fewer points"),
     )
-    closed_loop: bool = parameter(False, "turn the joints until the tracker sees the tip where it is wanted")
-    imu: Imu = parameter(Imu.NONE, "IMUs at the links' ends: none, to monitor the learned model, or for feedback, too")
-    vibration_damping: bool = parameter(False, "turn the joints against swings that the path's changes of speed excite")
+    model: str = parameter(
+        "",
+        "JSON file of a trained model; empty: the one that ships; no published one does",
+        origin=assumed("the trained model that ships; the paper's is not public"),
+    )
+    friction_compensation: bool = parameter(
+        False,
+        "free the currents of gear friction by which way each joint has been turning",
+        origin=stated("sec. VI names time series of data as future work"),
+    )
+    closed_loop: bool = parameter(
+        False,
+        "turn the joints until the tracker sees the tip where it is wanted",
+        origin=stated("sec. VI names closed-loop control as future work; the paper's is open loop"),
+    )
+    imu: Imu = parameter(
+        Imu.NONE,
+        "IMUs at the links' ends: none, to monitor the learned model, or for feedback, too",
+        origin=stated("sec. VI names IMUs as future work; the paper's arm has none"),
+    )
+    vibration_damping: bool = parameter(
+        False,
+        "turn the joints against swings that the path's changes of speed excite",
+        origin=stated("sec. VI names models of the dynamics as future work"),
+    )
     elbow: Elbow = parameter(Elbow.UP, "which way the elbow points")
-    L_1: Metre = parameter(0.15, "height of the shoulder", minimum=0.0, maximum=10.0)
-    L_2: Metre = parameter(0.225, "length of link 2", minimum=0.001, maximum=10.0)
-    L_3: Metre = parameter(0.225, "length of link 3", minimum=0.001, maximum=10.0)
+    L_1: Metre = parameter(
+        0.15,
+        "height of the shoulder",
+        minimum=0.0,
+        maximum=10.0,
+        origin=assumed("the controller knows the arm's dimensions, which are not given"),
+    )
+    L_2: Metre = parameter(
+        0.225,
+        "length of link 2",
+        minimum=0.001,
+        maximum=10.0,
+        origin=assumed("the controller knows the arm's dimensions, which are not given"),
+    )
+    L_3: Metre = parameter(
+        0.225,
+        "length of link 3",
+        minimum=0.001,
+        maximum=10.0,
+        origin=assumed("the controller knows the arm's dimensions, which are not given"),
+    )
     i_lag: Second = parameter(
-        0.2, "time constant of each of two lags that smooth the currents (assumed)", minimum=0.0, maximum=60.0
+        0.2,
+        "time constant of each of two lags that smooth the currents (assumed)",
+        minimum=0.0,
+        maximum=60.0,
+        origin=assumed("the paper mentions no smoothing of the currents"),
     )
     qd_correction: RadianPerSecond = parameter(
-        0.2, "joint speed that corrections are granted besides the path's (assumed)", minimum=0.0, maximum=100.0
+        0.2,
+        "joint speed that corrections are granted besides the path's (assumed)",
+        minimum=0.0,
+        maximum=100.0,
+        origin=assumed("the paper gives the speed of the uncorrected joints only, algorithms 1 and 2"),
     )
     reversal: Radian = parameter(
-        0.002, "turn that reverses the gears' friction, of its compensation (assumed)", minimum=1e-6, maximum=1.0
+        0.002,
+        "turn that reverses the gears' friction, of its compensation (assumed)",
+        minimum=1e-6,
+        maximum=1.0,
+        origin=assumed("play within which a gear's friction turns round, of its compensation; not in the paper"),
     )
     tracker_rate: Hertz = parameter(
-        30.0, "rate of the tracker's readings, of the closed loop", minimum=0.1, maximum=50.0
+        30.0,
+        "rate of the tracker's readings, of the closed loop",
+        minimum=0.1,
+        maximum=50.0,
+        origin=assumed("NDI Aurora (sec. IV-A); its maker states about 40 Hz, less with several sensors"),
     )
     tracker_lag: Second = parameter(
         0.2,
         "time constant by which the tip's errors are smoothed, of either loop (assumed)",
         minimum=0.0,
         maximum=60.0,
+        origin=assumed("such that the closed loop does not swing the arm up at 0.5 bar and 75 g; not in the paper"),
     )
     K_I: PerSecond = parameter(
-        2.0, "share of the tip's error that either loop takes away in a second (assumed)", minimum=0.0, maximum=20.0
+        2.0,
+        "share of the tip's error that either loop takes away in a second (assumed)",
+        minimum=0.0,
+        maximum=20.0,
+        origin=assumed("such that the closed loop does not swing the arm up at 0.5 bar and 75 g; not in the paper"),
     )
-    dq_max: Radian = parameter(0.2, "largest turn of a joint by either loop (assumed)", minimum=0.0, maximum=3.0)
+    dq_max: Radian = parameter(
+        0.2,
+        "largest turn of a joint by either loop (assumed)",
+        minimum=0.0,
+        maximum=3.0,
+        origin=assumed("twice what the joints turn further at 0.5 bar and 100 g; not in the paper"),
+    )
     imu_shares: Vector2[Number] = parameter(
         np.array([0.75, 1.0]),
         "share of a link's bend, joint included, by which it leads off its joint's angle, of links 2 and 3 (assumed)",
         minimum=0.0,
         maximum=1.5,
+        origin=assumed(
+            "fitted to 120 postures of VslArm at 0.4 to 2 bar, to 0.6 mm; 1/2 to 2/3 of a cantilever, 1 "
+            "where joints yield"
+        ),
     )
     mismatch_lag: Second = parameter(
-        2.0, "time constant by which measured less estimated tips are smoothed (assumed)", minimum=0.0, maximum=60.0
+        2.0,
+        "time constant by which measured less estimated tips are smoothed (assumed)",
+        minimum=0.0,
+        maximum=60.0,
+        origin=assumed("outlasts what gear friction does to the estimate as a path begins; not in the paper"),
     )
     mismatch_limit: Metre = parameter(
-        0.004, "smoothed distance of them from which the arm is not the one learned from", minimum=0.0, maximum=1.0
+        0.004,
+        "smoothed distance of them from which the arm is not the one learned from",
+        minimum=0.0,
+        maximum=1.0,
+        origin=assumed("above the 3.9 mm that it reaches on the arm that was learned from; not in the paper"),
     )
     K_F: Number = parameter(
         0.6,
         "share of the bending by a path's accelerations that is commanded ahead (assumed)",
         minimum=0.0,
         maximum=2.0,
+        origin=assumed(
+            "of what the currents say of bending, the servos' share does not yield so fast; not in the paper"
+        ),
     )
     K_D: PerSecond = parameter(
-        4.0, "share of the bending by a swing that joints yield by in a second (assumed)", minimum=0.0, maximum=20.0
+        4.0,
+        "share of the bending by a swing that joints yield by in a second (assumed)",
+        minimum=0.0,
+        maximum=20.0,
+        origin=assumed("damps a swing of 4 Hz within about two periods; not in the paper"),
     )
     qd_max: RadianPerSecond = parameter(
-        4.8, "joint speed where a bend is commanded ahead: as fast as the servos can", minimum=0.0, maximum=100.0
+        4.8,
+        "joint speed where a bend is commanded ahead: as fast as the servos can",
+        minimum=0.0,
+        maximum=100.0,
+        origin=derived("about the no-load speed of a Dynamixel XM430-W350-T (46 rev/min at 12 V)"),
     )
 
 

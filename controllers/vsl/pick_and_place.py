@@ -11,6 +11,7 @@ import numpy as np
 from handover.controllers.vsl.kinematics import Elbow, VslKinematics, format_point
 from handover.controllers.vsl.paths import Line
 from handover.cosim.blocks.block import InvalidParameters
+from handover.cosim.blocks.origins import assumed, read_off
 from handover.cosim.blocks.ports import Floats, Vector2, Vector3, output, parameter, port
 from handover.cosim.blocks.start_values import parameter_faults
 from handover.cosim.blocks.state import pack_state, unpack_state
@@ -42,26 +43,100 @@ class Params:
     """The task, speeds and pressures. [Gandarias2020] has no such experiment: all are assumed."""
 
     p_WP: Vector3[Metre] = parameter(
-        np.array([0.30, 0.0, 0.06]), "where the tip picks the object up, in the world", minimum=-10.0, maximum=10.0
+        np.array([0.30, 0.0, 0.06]),
+        "where the tip picks the object up, in the world",
+        minimum=-10.0,
+        maximum=10.0,
+        origin=assumed("as scenario pick"),
     )
     p_WQ: Vector3[Metre] = parameter(
-        np.array([0.36, 0.0, 0.06]), "where the tip puts it down, in the world", minimum=-10.0, maximum=10.0
+        np.array([0.36, 0.0, 0.06]),
+        "where the tip puts it down, in the world",
+        minimum=-10.0,
+        maximum=10.0,
+        origin=assumed("as scenario place"),
     )
-    hover: Metre = parameter(0.08, "how far above both it travels", minimum=0.0, maximum=1.0)
+    hover: Metre = parameter(
+        0.08, "how far above both it travels", minimum=0.0, maximum=1.0, origin=assumed("as scenario hover")
+    )
     press: Metre = parameter(
-        0.008, "how far below both it is commanded, to touch for certain", minimum=0.0, maximum=0.1
+        0.008,
+        "how far below both it is commanded, to touch for certain",
+        minimum=0.0,
+        maximum=0.1,
+        origin=assumed("as scenario press"),
     )
-    V: MetrePerSecond = parameter(0.1, "speed of the tip while it lifts and carries", minimum=1e-3, maximum=2.0)
-    V_contact: MetrePerSecond = parameter(0.03, "speed of the tip while it comes down", minimum=1e-3, maximum=2.0)
-    p_contact: Pascal = parameter(5e4, "pressure of both links near contacts", minimum=0.0, maximum=3e5)
-    p_carry: Pascal = parameter(2e5, "pressure of both links while it lifts and carries", minimum=0.0, maximum=3e5)
-    settle: Second = parameter(4.0, "time above the object before it comes down", minimum=0.0, maximum=600.0)
-    wait: Second = parameter(1.5, "time for pressures and the cup to follow", minimum=0.0, maximum=600.0)
-    qd_0: Vector3[RadianPerSecond] = parameter(np.full(3, 0.8), "joint speeds off the path", minimum=0.0, maximum=100.0)
-    elbow: Elbow = parameter(Elbow.UP, "which way the elbow points")
-    L_1: Metre = parameter(0.15, "height of the shoulder", minimum=0.0, maximum=10.0)
-    L_2: Metre = parameter(0.225, "length of link 2", minimum=0.001, maximum=10.0)
-    L_3: Metre = parameter(0.225, "length of link 3", minimum=0.001, maximum=10.0)
+    V: MetrePerSecond = parameter(
+        0.1,
+        "speed of the tip while it lifts and carries",
+        minimum=1e-3,
+        maximum=2.0,
+        origin=assumed("as scenario speed"),
+    )
+    V_contact: MetrePerSecond = parameter(
+        0.03,
+        "speed of the tip while it comes down",
+        minimum=1e-3,
+        maximum=2.0,
+        origin=assumed("as scenario contact_speed"),
+    )
+    p_contact: Pascal = parameter(
+        5e4,
+        "pressure of both links near contacts",
+        minimum=0.0,
+        maximum=3e5,
+        origin=assumed("as scenario contact_pressure"),
+    )
+    p_carry: Pascal = parameter(
+        2e5,
+        "pressure of both links while it lifts and carries",
+        minimum=0.0,
+        maximum=3e5,
+        origin=assumed("as scenario carry_pressure"),
+    )
+    settle: Second = parameter(
+        4.0,
+        "time above the object before it comes down",
+        minimum=0.0,
+        maximum=600.0,
+        origin=assumed("as scenario settle"),
+    )
+    wait: Second = parameter(
+        1.5, "time for pressures and the cup to follow", minimum=0.0, maximum=600.0, origin=assumed("as scenario wait")
+    )
+    qd_0: Vector3[RadianPerSecond] = parameter(
+        np.full(3, 0.8),
+        "joint speeds off the path",
+        minimum=0.0,
+        maximum=100.0,
+        origin=assumed("initial joint velocities of algorithms 1 and 2, not given"),
+    )
+    elbow: Elbow = parameter(
+        Elbow.UP,
+        "which way the elbow points",
+        origin=read_off("fig. 1(a) shows the elbow above the line from shoulder to tip"),
+    )
+    L_1: Metre = parameter(
+        0.15,
+        "height of the shoulder",
+        minimum=0.0,
+        maximum=10.0,
+        origin=assumed("the controller knows the arm's dimensions, which are not given"),
+    )
+    L_2: Metre = parameter(
+        0.225,
+        "length of link 2",
+        minimum=0.001,
+        maximum=10.0,
+        origin=assumed("the controller knows the arm's dimensions, which are not given"),
+    )
+    L_3: Metre = parameter(
+        0.225,
+        "length of link 3",
+        minimum=0.001,
+        maximum=10.0,
+        origin=assumed("the controller knows the arm's dimensions, which are not given"),
+    )
 
 
 @dataclass(kw_only=True)

@@ -14,6 +14,7 @@ from handover.controllers.vsl.kinematics import Elbow, VslKinematics, format_poi
 from handover.controllers.vsl.paths import Path, Segment, segments_of
 from handover.controllers.vsl.waypoints import InvalidWaypoints, read_waypoints
 from handover.cosim.blocks.block import InvalidParameters
+from handover.cosim.blocks.origins import assumed
 from handover.cosim.blocks.ports import Floats, Vector2, Vector3, output, parameter, port
 from handover.cosim.blocks.schedule import InvalidSchedule, Schedule
 from handover.cosim.blocks.start_values import parameter_faults
@@ -50,12 +51,38 @@ class Params:
     )
     x_0: Vector3[Metre] = parameter(np.array([0.3, 0.0, 0.05]), "first point of a CUSTOM path in the world")
     x_g: Vector3[Metre] = parameter(np.array([0.3, 0.0, 0.35]), "last point of a CUSTOM path in the world")
-    N: int = parameter(100, "points in each segment after its first", minimum=1, maximum=10000)
-    V: MetrePerSecond = parameter(0.05, "speed along the path", minimum=1e-4, maximum=2.0)
+    N: int = parameter(
+        100,
+        "points in each segment after its first",
+        minimum=1,
+        maximum=10000,
+        origin=assumed("algorithms 1 and 2, not given"),
+    )
+    V: MetrePerSecond = parameter(
+        0.05, "speed along the path", minimum=1e-4, maximum=2.0, origin=assumed("algorithms 1 and 2, not given")
+    )
     elbow: Elbow = parameter(Elbow.UP, "which way the elbow points")
-    L_1: Metre = parameter(0.15, "height of the shoulder", minimum=0.0, maximum=10.0)
-    L_2: Metre = parameter(0.225, "length of link 2", minimum=0.001, maximum=10.0)
-    L_3: Metre = parameter(0.225, "length of link 3", minimum=0.001, maximum=10.0)
+    L_1: Metre = parameter(
+        0.15,
+        "height of the shoulder",
+        minimum=0.0,
+        maximum=10.0,
+        origin=assumed("the controller knows the arm's dimensions, which are not given"),
+    )
+    L_2: Metre = parameter(
+        0.225,
+        "length of link 2",
+        minimum=0.001,
+        maximum=10.0,
+        origin=assumed("the controller knows the arm's dimensions, which are not given"),
+    )
+    L_3: Metre = parameter(
+        0.225,
+        "length of link 3",
+        minimum=0.001,
+        maximum=10.0,
+        origin=assumed("the controller knows the arm's dimensions, which are not given"),
+    )
     pressure: Vector2[Pascal] = parameter(
         np.array([5e4, 5e4]), "pressure of links 2 and 3 above the air's", minimum=0.0, maximum=MAX_PRESSURE
     )
@@ -63,12 +90,21 @@ class Params:
         "",
         "pressures, Pa, and from when on, s, in place of pressure: `8:1e5 12:5e4,2e5`, of both links or each; "
         "empty: none",
+        origin=assumed("the paper's pressures hold throughout a path"),
     )
     settle: Second = parameter(
-        3.0, "time at the first point before the path begins, to get there and calm down", minimum=0.0, maximum=600.0
+        3.0,
+        "time at the first point before the path begins, to get there and calm down",
+        minimum=0.0,
+        maximum=600.0,
+        origin=assumed("time for getting to the first point, algorithms 1 and 2: Move(q_k, dq_0)"),
     )
     qd_0: Vector3[RadianPerSecond] = parameter(
-        np.array([0.8, 0.8, 0.8]), "joint speeds off the path; 0 is the servo's own limit", minimum=0.0, maximum=100.0
+        np.array([0.8, 0.8, 0.8]),
+        "joint speeds off the path; 0 is the servo's own limit",
+        minimum=0.0,
+        maximum=100.0,
+        origin=assumed("initial joint velocities of algorithms 1 and 2, not given"),
     )
 
 

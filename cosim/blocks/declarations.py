@@ -55,6 +55,7 @@ def _variable(owner: str, field: "dataclasses.Field[Any]", hint: Any, causality:
         start=declaration.start,
         minimum=declaration.minimum,
         maximum=declaration.maximum,
+        origin=declaration.origin,
         **attributes,
     )
     fault = bounds_fault(variable) or ("" if causality is Causality.OUTPUT else start_fault(variable))

@@ -18,6 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 from typing_extensions import TypeAliasType
 
+from handover.cosim.blocks.origins import Origin
+
 
 class Width(enum.Enum):
     """How many bits a real or integer variable has at an FMU's boundary; the values are FMI 3's names.
@@ -150,14 +152,22 @@ class Declaration:
     start: Any
     minimum: float | None = None
     maximum: float | None = None
+    origin: Origin | None = None
 
 
-def parameter(default: T, description: str, *, minimum: float | None = None, maximum: float | None = None) -> T:
+def parameter(
+    default: T,
+    description: str,
+    *,
+    minimum: float | None = None,
+    maximum: float | None = None,
+    origin: Origin | None = None,
+) -> T:
     """Declare a parameter, as the default of a dataclass field: its value is fixed during a run.
 
-    Bounds are inclusive and hold for every entry of an array.
+    Bounds are inclusive and hold for every entry of an array. The origin says where the default comes from.
     """
-    d = Declaration(description=description, start=default, minimum=minimum, maximum=maximum)
+    d = Declaration(description=description, start=default, minimum=minimum, maximum=maximum, origin=origin)
     return _field_with_default(default, d)
 
 

@@ -7,6 +7,7 @@ import math
 import re
 from typing import Any
 
+from handover.cosim.blocks.origins import Origin
 from handover.cosim.blocks.ports import Raster, Width
 from handover.cosim.blocks.units import ONE, Unit
 
@@ -85,6 +86,7 @@ class Variable(Declared):
     """All that a block declares of a parameter, input or output."""
 
     start: Any
+    origin: Origin | None = None
     enumeration: type[enum.IntEnum] | None = None
     raster: Raster | None = None
 

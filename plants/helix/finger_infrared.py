@@ -12,6 +12,7 @@ import numpy as np
 
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.geometry import rotation_of
+from handover.cosim.blocks.origins import assumed, stated
 from handover.cosim.blocks.ports import Floats, Vector3, Vector4, Vector6, output, parameter, port
 from handover.cosim.blocks.start_values import parameter_faults
 from handover.cosim.blocks.state import pack_state, unpack_state
@@ -40,50 +41,143 @@ class Params:
     characteristic, eq. (11). All else is assumed, the characteristic's coefficients too.
     """
 
-    a: Metre = parameter(0.062, "a of the characteristic y = a exp(b x) + c exp(d x)", minimum=-1.0, maximum=1.0)
-    b: PerTick = parameter(-0.0030, "b of the characteristic", minimum=-0.1, maximum=0.1)
-    c: Metre = parameter(0.022, "c of the characteristic", minimum=-1.0, maximum=1.0)
-    d: PerTick = parameter(-0.00043, "d of the characteristic", minimum=-0.1, maximum=0.1)
-    nearest: Metre = parameter(0.004, "distance of the largest reading; nearer, readings fall again", minimum=1e-4)
-    farthest: Metre = parameter(0.065, "distance beyond which nothing is seen", maximum=0.15)
+    a: Metre = parameter(
+        0.062,
+        "a of the characteristic y = a exp(b x) + c exp(d x)",
+        minimum=-1.0,
+        maximum=1.0,
+        origin=assumed("eq. (11) of [Luberto]; coefficients are not given: as the infrared grasp's"),
+    )
+    b: PerTick = parameter(
+        -0.0030,
+        "b of the characteristic",
+        minimum=-0.1,
+        maximum=0.1,
+        origin=assumed("eq. (11) of [Luberto]; coefficients are not given: as the infrared grasp's"),
+    )
+    c: Metre = parameter(
+        0.022,
+        "c of the characteristic",
+        minimum=-1.0,
+        maximum=1.0,
+        origin=assumed("eq. (11) of [Luberto]; coefficients are not given: as the infrared grasp's"),
+    )
+    d: PerTick = parameter(
+        -0.00043,
+        "d of the characteristic",
+        minimum=-0.1,
+        maximum=0.1,
+        origin=assumed("eq. (11) of [Luberto]; coefficients are not given: as the infrared grasp's"),
+    )
+    nearest: Metre = parameter(
+        0.004,
+        "distance of the largest reading; nearer, readings fall again",
+        minimum=1e-4,
+        origin=stated("[Luberto] sec. V-B: 4 to 65 mm"),
+    )
+    farthest: Metre = parameter(
+        0.065, "distance beyond which nothing is seen", maximum=0.15, origin=stated("[Luberto] sec. V-B: 4 to 65 mm")
+    )
     contact_share: Number = parameter(
-        0.4, "share of the largest reading that is left at contact", minimum=0.0, maximum=1.0
+        0.4,
+        "share of the largest reading that is left at contact",
+        minimum=0.0,
+        maximum=1.0,
+        origin=assumed("as the infrared grasp's"),
     )
     incidence_exponent: Number = parameter(
-        1.0, "exponent n of the reading's fall with cos(theta)^n, theta from the normal", minimum=0.0, maximum=10.0
+        1.0,
+        "exponent n of the reading's fall with cos(theta)^n, theta from the normal",
+        minimum=0.0,
+        maximum=10.0,
+        origin=assumed("as the infrared grasp's: Lambert's law"),
     )
-    beam: Radian = parameter(0.35, "half the opening angle of a sensor's beam", minimum=0.0, maximum=0.7)
+    beam: Radian = parameter(
+        0.35,
+        "half the opening angle of a sensor's beam",
+        minimum=0.0,
+        maximum=0.7,
+        origin=assumed(
+            "small reflective sensors have half their intensity some 20 degrees off; one with less misses "
+            "a ball beside the axis"
+        ),
+    )
     across: Radian = parameter(
         -0.23,
         "angle of the first sensor's beam from the normal of the finger's last link, towards its tip",
         minimum=-1.5,
         maximum=1.5,
+        origin=assumed("of open fingers the beam then goes square across to the gripper's axis"),
     )
-    ahead: Radian = parameter(0.47, "angle of the second sensor's beam from that normal", minimum=-1.5, maximum=1.5)
-    ball_radius: Metre = parameter(0.025, "radius of the ball", minimum=0.001, maximum=0.1)
+    ahead: Radian = parameter(
+        0.47,
+        "angle of the second sensor's beam from that normal",
+        minimum=-1.5,
+        maximum=1.5,
+        origin=assumed(
+            "of open fingers the beam then points 40 degrees ahead: to the middle of a ball that is 50 mm "
+            "before the gripper"
+        ),
+    )
+    ball_radius: Metre = parameter(
+        0.025, "radius of the ball", minimum=0.001, maximum=0.1, origin=assumed("as the cameras see it")
+    )
     ball_reflectivity: Number = parameter(
-        1.0, "reflectivity of the ball over the reference's", minimum=0.0, maximum=2.0
+        1.0,
+        "reflectivity of the ball over the reference's",
+        minimum=0.0,
+        maximum=2.0,
+        origin=assumed("that of the surface the sensors were characterised with"),
     )
-    palm_radius: Metre = parameter(0.045, "how far the palm reaches from its middle", minimum=0.0, maximum=0.2)
+    palm_radius: Metre = parameter(
+        0.045,
+        "how far the palm reaches from its middle",
+        minimum=0.0,
+        maximum=0.2,
+        origin=assumed("as the hand touches"),
+    )
     palm_height: Metre = parameter(
-        0.015, "height of the palm's surface over its middle, as the input gives that", minimum=-0.1, maximum=0.1
+        0.015,
+        "height of the palm's surface over its middle, as the input gives that",
+        minimum=-0.1,
+        maximum=0.1,
+        origin=assumed("the ball, whose middle is 40 mm over the palm's middle, lies on it"),
     )
     palm_reflectivity: Number = parameter(
-        0.6, "reflectivity of the palm over the reference's", minimum=0.0, maximum=2.0
+        0.6,
+        "reflectivity of the palm over the reference's",
+        minimum=0.0,
+        maximum=2.0,
+        origin=assumed("skin returns some six tenths of what a white card does in the near infrared"),
     )
     tolerance: Number = parameter(
-        0.05, "standard deviation of a sensor's gain from that of the characteristic", minimum=0.0, maximum=0.5
+        0.05,
+        "standard deviation of a sensor's gain from that of the characteristic",
+        minimum=0.0,
+        maximum=0.5,
+        origin=assumed("parts of one make differ by some percent after calibration of one of them"),
     )
     range_tolerance: Number = parameter(
         0.05,
         "standard deviation of the distance at which a sensor reads what the characteristic says, as a part of it",
         minimum=0.0,
         maximum=0.3,
+        origin=assumed("parts of one make differ by some percent after calibration of one of them"),
     )
     mounting_tolerance: Radian = parameter(
-        0.03, "standard deviation of a beam's direction, along the finger and to its side", minimum=0.0, maximum=0.3
+        0.03,
+        "standard deviation of a beam's direction, along the finger and to its side",
+        minimum=0.0,
+        maximum=0.3,
+        origin=assumed("small parts that are glued into a printed finger are off by a degree or two"),
     )
-    noise: Tick = parameter(4.0, "standard deviation of a reading", minimum=0.0, maximum=1000.0)
+    noise: Tick = parameter(
+        4.0,
+        "standard deviation of a reading",
+        minimum=0.0,
+        maximum=1000.0,
+        origin=assumed("as the infrared grasp's"),
+    )
     seed: int = parameter(0, "seed of gains, ranges, mounting and noise", minimum=0)
 
     def sensor(self) -> InfraredSensor:

@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from handover.cosim.blocks.block import InvalidParameters
+from handover.cosim.blocks.origins import assumed
 from handover.cosim.blocks.ports import Vector3, output, parameter, port
 from handover.cosim.blocks.start_values import parameter_faults
 from handover.cosim.blocks.state import pack_state, unpack_state
@@ -25,18 +26,44 @@ class InvalidVacuumGripper(InvalidParameters):
 class Params:
     """The cup and the object; all assumed."""
 
-    mass: Kilogram = parameter(0.05, "mass of the object", minimum=0.0, maximum=0.5)
+    mass: Kilogram = parameter(
+        0.05,
+        "mass of the object",
+        minimum=0.0,
+        maximum=0.5,
+        origin=assumed("no object is picked up in the paper; within the loads of sec. V-C, 0 to 100 g"),
+    )
     p_WO_0: Vector3[Metre] = parameter(
-        np.array([0.35, 0.0, 0.05]), "where the object's top is at the start", minimum=-10.0, maximum=10.0
+        np.array([0.35, 0.0, 0.05]),
+        "where the object's top is at the start",
+        minimum=-10.0,
+        maximum=10.0,
+        origin=assumed("a corner of the square of sec. V-A, where the tip comes to pick up"),
     )
     reach: Metre = parameter(
-        0.01, "how far from the object's top the gripper may be to pick it up", minimum=0.0, maximum=0.1
+        0.01,
+        "how far from the object's top the gripper may be to pick it up",
+        minimum=0.0,
+        maximum=0.1,
+        origin=assumed("about the radius of a small suction cup"),
     )
-    suction: Newton = parameter(5.0, "weight that the cup holds", minimum=0.0, maximum=1e3)
+    suction: Newton = parameter(
+        5.0,
+        "weight that the cup holds",
+        minimum=0.0,
+        maximum=1e3,
+        origin=assumed("a cup of 2 cm across at a vacuum of 0.2 bar, about; the gripper of sec. II-A is not described"),
+    )
     landing: Metre = parameter(
-        0.05, "height of the object's top where it comes to rest when it is dropped", minimum=-10.0, maximum=10.0
+        0.05,
+        "height of the object's top where it comes to rest when it is dropped",
+        minimum=-10.0,
+        maximum=10.0,
+        origin=assumed("the object stands on the ground and is 5 cm high"),
     )
-    gravity: MetrePerSecond2 = parameter(9.81, "gravity, along -z of the world", minimum=0.0, maximum=30.0)
+    gravity: MetrePerSecond2 = parameter(
+        9.81, "gravity, along -z of the world", minimum=0.0, maximum=30.0, origin=assumed("on the ground")
+    )
 
 
 @dataclass(kw_only=True)

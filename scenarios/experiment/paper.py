@@ -4,7 +4,7 @@
 """
 
 import functools
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import resources
 from typing import Any
@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import tomli
 
-from handover.cosim.blocks.variable import Variable
 from handover.scenarios.experiment.returned_types import Checked
 
 
@@ -28,27 +27,6 @@ def paper_entry(scenario: str, group: str, name: str) -> dict[str, Any]:
         KeyError: there is no value of that name.
     """
     return dict(_read(scenario)[group][name])
-
-
-def parameter_origins(scenario: str, variables: Iterable[Variable]) -> dict[str, dict[str, Any]]:
-    """Return the entries of a scenario's `paper.toml` that give the defaults of parameters, by their names.
-
-    An entry has the parameter's name, unit and default. Of several that of the group which all are for counts, else of
-    the one with most of them.
-    """
-    declared = {v.name: v for v in variables}
-    groups = [
-        (group, [n for n, entry in group.items() if n in declared and _gives(entry, declared[n])])
-        for group in _read(scenario).values()
-    ]
-    groups.sort(key=lambda found: (len(found[1]) == len(found[0]), len(found[1])))
-    return {name: dict(group[name]) for group, names in groups for name in names}
-
-
-def _gives(entry: Mapping[str, Any], v: Variable) -> bool:
-    """Return whether an entry has a parameter's unit and default."""
-    default = v.start.name.lower() if v.items else v.start
-    return entry["unit"] == v.unit.symbol and np.array_equal(default, entry["value"])
 
 
 @functools.lru_cache

@@ -1,4 +1,4 @@
-"""Parameters of the free-flyer's handovers, and of a push against its gripper; `paper.toml` has their origins."""
+"""Parameters of the free-flyer's handovers, and of a push against its gripper."""
 
 import enum
 from dataclasses import dataclass, fields
@@ -7,8 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from handover.cosim.blocks.origins import Origin, assumed, derived, stated
 from handover.cosim.blocks.ports import Floats, Vector3, parameter
 from handover.cosim.blocks.units import Kilogram, Metre, Newton, NewtonMetre, Number, Second
+from handover.plants.free_flyer.hand.parameters import Params as PersonParams
+from handover.plants.free_flyer.robot.free_flyer import Params as RobotParams
 from handover.scenarios.experiment.paper import paper_values
 
 _UNSKILLED_ERRORS = 8.0
@@ -60,22 +63,30 @@ class Body:
     p_BG: Floats
 
 
-def _factor(of_what: str) -> float:
-    return parameter(1.0, f"{of_what}, times the public value", minimum=0.2, maximum=5.0)
+def _factor(of_what: str, origin: Origin) -> float:
+    return parameter(1.0, f"{of_what}, times the public value", minimum=0.2, maximum=5.0, origin=origin)
+
+
+_AS_PUBLISHED = assumed("the robot is as published")
+_READ_BY_THE_CONTROLLER = assumed("sec. 4.1.2: the controller reads mass and inertia from the robot's own topic")
 
 
 @dataclass(frozen=True, kw_only=True)
 class RobotAndModel:
-    """What the robot is, and what its controllers take it for: each times the public values of `paper.toml`."""
+    """What the robot is, and what its controllers take it for: each times the public values."""
 
-    mass_factor: Number = _factor("robot's mass")
-    inertia_factor: Number = _factor("robot's inertia")
-    arm_factor: Number = _factor("length of the robot's arm")
-    model_mass_factor: Number = _factor("mass that the robot's controllers assume")
-    model_inertia_factor: Number = _factor("inertia that the robot's controllers assume")
-    model_arm_factor: Number = _factor("length of the arm that the robot's controllers assume")
+    mass_factor: Number = _factor("robot's mass", _AS_PUBLISHED)
+    inertia_factor: Number = _factor("robot's inertia", _AS_PUBLISHED)
+    arm_factor: Number = _factor("length of the robot's arm", assumed("the arm is as long as assumed"))
+    model_mass_factor: Number = _factor("mass that the robot's controllers assume", _READ_BY_THE_CONTROLLER)
+    model_inertia_factor: Number = _factor("inertia that the robot's controllers assume", _READ_BY_THE_CONTROLLER)
+    model_arm_factor: Number = _factor("length of the arm that the robot's controllers assume", _READ_BY_THE_CONTROLLER)
     stuck_nozzle: int = parameter(
-        0, "which of twelve nozzles is stuck closed, unknown to the robot; 0: none", minimum=0, maximum=12
+        0,
+        "which of twelve nozzles is stuck closed, unknown to the robot; 0: none",
+        minimum=0,
+        maximum=12,
+        origin=assumed("all nozzles are whole"),
     )
 
     @property
@@ -95,7 +106,7 @@ class RobotAndModel:
 
 
 def _body(mass: float, inertia: float, arm: float) -> Body:
-    public = paper_values("free_flyer", "robot")
+    public = vars(RobotParams())
     return Body(mass * float(public["mass"]), inertia * np.array(public["I_B"]), arm * np.array(public["p_BG"]))
 
 
@@ -103,21 +114,36 @@ def _body(mass: float, inertia: float, arm: float) -> Body:
 class HandoverParameters(RobotAndModel):
     """One handover. Bounds of the place keep it within the person's and the robot's part of the cabin (assumed)."""
 
-    behaviour: Behaviour = parameter(Behaviour.RIGID, "setting of the impedance controller, [Fernandes2020] table 4.1")
+    behaviour: Behaviour = parameter(
+        Behaviour.RIGID, "setting of the impedance controller, [Fernandes2020] table 4.1", origin=stated("table 4.1")
+    )
     p_WG_handover: Vector3[Metre] = parameter(
-        np.array([0.0, -0.07, 0.0]), "where the gripper waits for the person, in W", minimum=-1.0, maximum=1.0
+        np.array([0.0, -0.07, 0.0]),
+        "where the gripper waits for the person, in W",
+        minimum=-1.0,
+        maximum=1.0,
+        origin=stated("sec. 4.1.3, 4.3.1"),
     )
     strength: Newton = parameter(
-        4.0, "force with which the person pulls; with half of it, pushes", minimum=0.1, maximum=20.0
+        4.0,
+        "force with which the person pulls; with half of it, pushes",
+        minimum=0.1,
+        maximum=20.0,
+        origin=assumed(
+            "not given: with ideal thrust it moves the rigid robot by about the 40 mm of sec. 4.3.1, "
+            "which it was chosen for"
+        ),
     )
     hand: Hand = parameter(
         Hand.SIMULATED,
         "who moves the person's hand: a simulated person, or inputs from outside, as of the page of --live",
+        origin=assumed("sec. 4.2: hands of users lead it; without one at hand, a simulated person"),
     )
     hand_track: str = parameter(
         "",
         "file of a recorded track that leads the hand, of `handover flyer-track`; empty: a simulated person. A track "
         "reacts to nothing, neither to the light nor to the robot",
+        origin=assumed("sec. 4.2: hands of users lead it, whose tracks are not given"),
     )
     skill: Number = parameter(
         1.0,
@@ -125,20 +151,40 @@ class HandoverParameters(RobotAndModel):
         "does not wait for the gripper in three of ten attempts",
         minimum=0.0,
         maximum=1.0,
+        origin=assumed(
+            "not given; the participants had little or no practice (sec. 5.4) and failed in 0 to 15 of 100 (sec. 5.8)"
+        ),
     )
     sight_error: Metre = parameter(
         0.002,
         "error of a skilled person's sight, along each axis across it, standard deviation",
         minimum=0.0,
         maximum=0.1,
+        origin=assumed("as person.sight_error"),
     )
-    depth_error: Metre = parameter(0.006, "the same along the line of sight", minimum=0.0, maximum=0.1)
-    interface_delay: Second = parameter(0.05, "how old is what the person sees", minimum=0.0, maximum=2.0)
-    propulsion: Propulsion = parameter(Propulsion.LIMITED, "what the thrusters are like")
-    delay: Second = parameter(0.0, "delay between a command and its thrust", minimum=0.0, maximum=0.2)
-    gradual: bool = parameter(False, "whether the fingers follow pull and push, and their grip fades as they open")
+    depth_error: Metre = parameter(
+        0.006, "the same along the line of sight", minimum=0.0, maximum=0.1, origin=assumed("as person.depth_error")
+    )
+    interface_delay: Second = parameter(
+        0.05, "how old is what the person sees", minimum=0.0, maximum=2.0, origin=assumed("sec. 4.2.3: less than 0.1 s")
+    )
+    propulsion: Propulsion = parameter(
+        Propulsion.LIMITED,
+        "what the thrusters are like",
+        origin=assumed("the handovers are possible within Astrobee's limits"),
+    )
+    delay: Second = parameter(
+        0.0, "delay between a command and its thrust", minimum=0.0, maximum=0.2, origin=assumed("not given")
+    )
+    gradual: bool = parameter(
+        False,
+        "whether the fingers follow pull and push, and their grip fades as they open",
+        origin=derived("as decision.gradual"),
+    )
     verify: bool = parameter(
-        False, "whether the robot closes its gripper again after a release, to notice an object that was not taken"
+        False,
+        "whether the robot closes its gripper again after a release, to notice an object that was not taken",
+        origin=assumed("not given: sec. 3.2 takes what was released for delivered"),
     )
     navigation_delay: Second = parameter(
         0.0,
@@ -146,10 +192,19 @@ class HandoverParameters(RobotAndModel):
         " would be unstable with it; of one that they do not know, set navigation.delay",
         minimum=0.0,
         maximum=0.2,
+        origin=assumed("not given"),
     )
-    gated: bool = parameter(True, "whether the robot yields and signals only once it is at rest in its place")
+    gated: bool = parameter(
+        True,
+        "whether the robot yields and signals only once it is at rest in its place",
+        origin=assumed("as decision.gated"),
+    )
     patience: Second = parameter(
-        60.0, "time in any one phase after which the robot gives up", minimum=1.0, maximum=600.0
+        60.0,
+        "time in any one phase after which the robot gives up",
+        minimum=1.0,
+        maximum=600.0,
+        origin=assumed("not given"),
     )
 
     @property
@@ -165,9 +220,7 @@ class HandoverParameters(RobotAndModel):
     def traits(self) -> dict[str, Any]:
         """Parameters of the person's unit that follow from strength and skill (assumed)."""
         worse = _UNSKILLED_ERRORS + (1.0 - _UNSKILLED_ERRORS) * self.skill
-        skilled = {
-            name: float(value) for name, value in paper_values("free_flyer", "person").items() if name in _SCALED
-        }
+        skilled = {name: float(value) for name, value in vars(PersonParams()).items() if name in _SCALED}
         return {
             "effort": self.strength,
             "arm_force_max": _YIELDING * self.strength,
@@ -194,7 +247,11 @@ class Task(_OfUnit):
 class TaskParameters(HandoverParameters):
     """One handover of any kind."""
 
-    task: Task = parameter(Task.ROBOT_TO_HUMAN, "which of the four handovers")
+    task: Task = parameter(
+        Task.ROBOT_TO_HUMAN,
+        "which of the four handovers",
+        origin=assumed("not given: the first of the handovers of sec. 4.3"),
+    )
 
 
 class TeamTask(_OfUnit):
@@ -220,24 +277,52 @@ class Hands(_OfUnit):
 class TeamParameters(HandoverParameters):
     """One handover of a large object by two robots, which are alike."""
 
-    task: TeamTask = parameter(TeamTask.ROBOTS_TO_HUMAN, "who gives the object to whom")
+    task: TeamTask = parameter(
+        TeamTask.ROBOTS_TO_HUMAN, "who gives the object to whom", origin=assumed("sec. 4.3.1: the first of the two")
+    )
     p_WG_handover: Vector3[Metre] = parameter(
         np.array([0.28, 0.0, 0.0]),
         "where the middle between the grippers waits for the person, in W",
         minimum=-1.0,
         maximum=1.0,
+        origin=assumed("as team_decision.p_WG_handover"),
     )
     strength: Newton = parameter(
-        4.0, "force with which each hand of the person pulls; with half of it, pushes", minimum=0.1, maximum=20.0
+        4.0,
+        "force with which each hand of the person pulls; with half of it, pushes",
+        minimum=0.1,
+        maximum=20.0,
+        origin=assumed(
+            "not given: with ideal thrust it moves the rigid robot by about the 40 mm of sec. 4.3.1, "
+            "which it was chosen for"
+        ),
     )
-    hand: Hand = parameter(Hand.SIMULATED, "who moves the person's hands: here a simulated person alone")
-    hand_track: str = parameter("", "always empty here: a track leads one hand")
-    hands: Hands = parameter(Hands.TWO, "with which hands the person holds the object, and where")
+    hand: Hand = parameter(
+        Hand.SIMULATED,
+        "who moves the person's hands: here a simulated person alone",
+        origin=assumed("sec. 4.2: hands of users lead it; without one at hand, a simulated person"),
+    )
+    hand_track: str = parameter(
+        "",
+        "always empty here: a track leads one hand",
+        origin=assumed("sec. 4.2: hands of users lead it, whose tracks are not given"),
+    )
+    hands: Hands = parameter(
+        Hands.TWO, "with which hands the person holds the object, and where", origin=derived("sec. 6.3: both hands")
+    )
     hand_delay: Second = parameter(
-        0.0, "how much later than the first the second hand closes and opens", minimum=0.0, maximum=5.0
+        0.0,
+        "how much later than the first the second hand closes and opens",
+        minimum=0.0,
+        maximum=5.0,
+        origin=assumed("both hands close at once"),
     )
-    together: bool = parameter(True, "whether the robots decide together; else each for itself")
-    object_mass: Kilogram = parameter(3.0, "mass of the object", minimum=0.1, maximum=50.0)
+    together: bool = parameter(
+        True, "whether the robots decide together; else each for itself", origin=derived("as team_decision.together")
+    )
+    object_mass: Kilogram = parameter(
+        3.0, "mass of the object", minimum=0.1, maximum=50.0, origin=assumed("as large_object.object_mass")
+    )
 
     @property
     def hand_numbers(self) -> tuple[str, ...]:
@@ -264,29 +349,56 @@ class Wrench(enum.IntEnum):
 class ImpedanceParameters(RobotAndModel):
     """One push."""
 
-    behaviour: Behaviour = parameter(Behaviour.RIGID, "setting of the impedance controller, [Fernandes2020] table 4.1")
-    kind: Wrench = parameter(Wrench.FORCE, "whether the gripper is pushed or twisted")
-    axis: Axis = parameter(Axis.X, "axis of W of the push")
-    force: Newton = parameter(5.0, "force of a push", minimum=-50.0, maximum=50.0)
-    torque: NewtonMetre = parameter(3.0, "torque of a twist", minimum=-10.0, maximum=10.0)
-    begin: Second = parameter(1.0, "when the push begins", minimum=0.0, maximum=60.0)
-    duration: Second = parameter(0.5, "how long the push lasts", minimum=0.0, maximum=60.0)
-    propulsion: Propulsion = parameter(
-        Propulsion.IDEAL, "what the thrusters are like; the published plots need ideal ones"
+    behaviour: Behaviour = parameter(
+        Behaviour.RIGID, "setting of the impedance controller, [Fernandes2020] table 4.1", origin=stated("table 4.1")
     )
-    delay: Second = parameter(0.0, "delay between a command and its thrust", minimum=0.0, maximum=0.2)
+    kind: Wrench = parameter(
+        Wrench.FORCE, "whether the gripper is pushed or twisted", origin=stated("sec. 4.1.3: forces and torques")
+    )
+    axis: Axis = parameter(Axis.X, "axis of W of the push", origin=stated("figs. 4.5-4.16: each axis"))
+    force: Newton = parameter(
+        5.0, "force of a push", minimum=-50.0, maximum=50.0, origin=stated("figs. 4.5-4.7, 4.11-4.13")
+    )
+    torque: NewtonMetre = parameter(
+        3.0, "torque of a twist", minimum=-10.0, maximum=10.0, origin=stated("figs. 4.8-4.10, 4.14-4.16")
+    )
+    begin: Second = parameter(1.0, "when the push begins", minimum=0.0, maximum=60.0, origin=assumed("not given"))
+    duration: Second = parameter(
+        0.5, "how long the push lasts", minimum=0.0, maximum=60.0, origin=assumed("not given in the text")
+    )
+    propulsion: Propulsion = parameter(
+        Propulsion.IDEAL,
+        "what the thrusters are like; the published plots need ideal ones",
+        origin=derived("derived from the plots of sec. 4.1.3: with Astrobee's limits the robot tumbles at 3 N m"),
+    )
+    delay: Second = parameter(
+        0.0, "delay between a command and its thrust", minimum=0.0, maximum=0.2, origin=assumed("not given")
+    )
     navigation_delay: Second = parameter(
         0.0,
         "age of the estimate of the robot's pose and velocities, which the controller expects if delay_known",
         minimum=0.0,
         maximum=0.2,
+        origin=assumed("not given"),
     )
     delay_known: bool = parameter(
-        True, "whether the controller knows both delays, and rejects ones it is unstable with"
+        True,
+        "whether the controller knows both delays, and rejects ones it is unstable with",
+        origin=assumed("delays that are known are part of the controller's stability check"),
     )
-    patience: Second = parameter(60.0, "time after the push by which the robot must rest", minimum=1.0, maximum=600.0)
+    patience: Second = parameter(
+        60.0,
+        "time after the push by which the robot must rest",
+        minimum=1.0,
+        maximum=600.0,
+        origin=assumed("not given"),
+    )
     parallel_step: Second = parameter(
-        0.002, "communication step in a host that steps all units in parallel (Jacobi)", minimum=0.0005, maximum=0.016
+        0.002,
+        "communication step in a host that steps all units in parallel (Jacobi)",
+        minimum=0.0005,
+        maximum=0.016,
+        origin=assumed("numerical: both behaviours are stable with the three delays by it that parallel steps bring"),
     )
 
     @property

@@ -18,6 +18,7 @@ from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PlacedUnit
 from handover.plants.free_flyer.hand.box import Box
+from handover.plants.free_flyer.hand.parameters import Params as PersonParams
 from handover.scenarios.experiment.experiment import Metric
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.starts import LEAST_DEPTH, array_of, penetration_fault
@@ -61,7 +62,7 @@ class Solid:
 def robot_solids(name: str, p_WB: Floats, q_WB: Floats, p_BG: Floats) -> list[Solid]:
     """Return cube and arm of a robot whose centre of mass is at p_WB, and whose gripper at p_BG in its frame, m."""
     R = rotation_of(q_WB)
-    edge, palm = _edge(), float(paper_values("free_flyer", "person")["palm_depth"])
+    edge, palm = _edge(), PersonParams().palm_depth
     near, far = -edge / 2.0, float(p_BG[0]) + palm
     solids = [Solid(f"{name}'s cube", p_WB, R, np.full(3, edge / 2.0))]
     if far < near:

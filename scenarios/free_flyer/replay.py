@@ -9,6 +9,7 @@ from handover.cosim.blocks.geometry import rotation_of
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.plants.free_flyer.hand.hand_kinematics import PALM_BONES, PALM_RADIUS
+from handover.plants.free_flyer.large_object.parameters import Params as LargeObjectParams
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.replay import Body, Line, Mesh, PersonView, Replay, ball, faceted, hull
 from handover.scenarios.free_flyer.parameters import ROBOTS, ImpedanceParameters, TeamParameters, Wrench
@@ -79,7 +80,7 @@ def replay_team(parameters: TeamParameters, record: Record) -> Replay:
     palms = [_palm(record, h) for h in hands]
     ways: dict[str, float | Floats] = {f"robot_{r}.p_WB": _CUBE_ROOM for r in ROBOTS}
     ways |= {f"person.p_WH{h}": _ROOM for h in hands}
-    ways["person.p_WO"] = 0.6 * np.array(paper_values("free_flyer", "large_object")["object_size"])
+    ways["person.p_WO"] = 0.6 * np.array(LargeObjectParams().object_size)
     return Replay(
         bodies=[*robots, *parts, *palms],
         lines=[

@@ -14,9 +14,9 @@ from handover.controllers.free_flyer.ports import Behaviour as Gains
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PlacedUnit, System
+from handover.plants.free_flyer.robot.thrusters import Params as ThrustersParams
 from handover.scenarios.experiment.experiment import FmuOf, Metric
 from handover.scenarios.experiment.live_inputs import Pushable
-from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.free_flyer.parameters import (
     ROBOTS,
@@ -70,7 +70,7 @@ def expected_lag(propulsion: Propulsion) -> float:
     """
     if propulsion is Propulsion.IDEAL:
         return 0.0
-    values = paper_values("free_flyer", "thrusters")
+    values = vars(ThrustersParams())
     return float(values["flapper_lag" if propulsion is Propulsion.NOZZLES else "lag"])
 
 

@@ -16,8 +16,9 @@ from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.plants.free_flyer.hand.gripper_contact import JAW_SIDES, PALM_THICKNESS
 from handover.plants.free_flyer.hand.hand_kinematics import FINGERS, PALM, PALM_SIDES, RADIUS, joint_places
+from handover.plants.free_flyer.hand.parameters import Params as PersonParams
+from handover.plants.free_flyer.large_object.parameters import Params as LargeObjectParams
 from handover.scenarios.experiment.experiment import Figure
-from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import figure
 from handover.scenarios.free_flyer.parameters import Hands
 
@@ -68,7 +69,7 @@ class Solid:
 
 def jaw_gap(record: Record, suffix: str = "") -> Floats:
     """Return the room between the jaws of the gripper, or of a robot's with a suffix, over time, shape (rows,), m."""
-    g, angle = paper_values("free_flyer", "person"), record[f"person.gripper_angle{suffix}"]
+    g, angle = vars(PersonParams()), record[f"person.gripper_angle{suffix}"]
     return g["aperture"] * (angle - g["angle_empty"]) / (g["angle_open"] - g["angle_empty"])
 
 
@@ -114,7 +115,7 @@ def large_object_at(record: Record, row: int, hands: Hands) -> list[Solid]:
     One hand in the middle has its handle there, in place of the two at the ends. The posts on which handles stand are
     drawn only: nothing touches them.
     """
-    large = {name: np.array(value) for name, value in paper_values("free_flyer", "large_object").items()}
+    large = {name: np.array(value) for name, value in vars(LargeObjectParams()).items()}
     p_WO, R_WO = _at(record, "person.p_WO", row), rotation_of(_at(record, "person.q_WO", row))
     length, width, thick = large["object_size"].tolist()
     bars = large["handle_size"].tolist()

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from handover.cosim.blocks.origins import assumed, derived
 from handover.cosim.blocks.ports import Floats, parameter
 from handover.cosim.blocks.units import (
     Kilogram,
@@ -23,7 +24,7 @@ from handover.cosim.blocks.units import (
     Radian,
     Second,
 )
-from handover.scenarios.experiment.paper import paper_values
+from handover.plants.helix.arm.tendon_parameters import Params as ArmParams
 
 
 class Cover(enum.IntEnum):
@@ -39,51 +40,174 @@ class Disturbances:
     """What may be amiss with arm, hand, cameras and controller, each by itself."""
 
     arm_stiffness: Number = parameter(
-        1.0, "stiffness of the arm's material over the usual one", minimum=0.3, maximum=3.0
+        1.0,
+        "stiffness of the arm's material over the usual one",
+        minimum=0.3,
+        maximum=3.0,
+        origin=derived("undisturbed: the arm as it is"),
     )
-    gripper_load: Number = parameter(1.0, "mass of the gripper over the usual one", minimum=0.1, maximum=4.0)
-    tremor: Metre = parameter(0.001, "root mean square of the hand's tremor", minimum=0.0, maximum=0.05)
-    drift: Metre = parameter(0.003, "root mean square of the hand's drift", minimum=0.0, maximum=0.1)
-    ball_mass: Kilogram = parameter(0.02, "mass of the ball", minimum=0.001, maximum=1.0)
+    gripper_load: Number = parameter(
+        1.0,
+        "mass of the gripper over the usual one",
+        minimum=0.1,
+        maximum=4.0,
+        origin=derived("undisturbed: the arm as it is"),
+    )
+    tremor: Metre = parameter(
+        0.001,
+        "root mean square of the hand's tremor",
+        minimum=0.0,
+        maximum=0.05,
+        origin=assumed("physiological tremor of an outstretched hand"),
+    )
+    drift: Metre = parameter(
+        0.003,
+        "root mean square of the hand's drift",
+        minimum=0.0,
+        maximum=0.1,
+        origin=assumed("how still a hand is held"),
+    )
+    ball_mass: Kilogram = parameter(
+        0.02, "mass of the ball", minimum=0.001, maximum=1.0, origin=assumed("a light ball of 25 mm radius")
+    )
     finger_friction: Number = parameter(
-        0.8, "friction between the gripper's fingers and the ball", minimum=0.0, maximum=3.0
+        0.8,
+        "friction between the gripper's fingers and the ball",
+        minimum=0.0,
+        maximum=3.0,
+        origin=assumed("rubber on a smooth ball"),
     )
-    hand_force_max: Newton = parameter(5.0, "force on the hand that the person tolerates", minimum=0.1, maximum=1000.0)
+    hand_force_max: Newton = parameter(
+        5.0,
+        "force on the hand that the person tolerates",
+        minimum=0.1,
+        maximum=1000.0,
+        origin=assumed("what a person who holds a hand out lets an arm press"),
+    )
     help_speed: MetrePerSecond = parameter(
         0.0,
         "how fast the person brings the ball between the fingers of a gripper that closes; 0: holds it still",
         minimum=0.0,
         maximum=1.0,
+        origin=derived("secs. 3.5 and 3.5.1 say only that the hand holds the ball; see experiment.help_speed"),
     )
     guidance: NewtonPerMetre = parameter(
-        0.0, "stiffness with which the person draws the gripper to the ball", minimum=0.0, maximum=1000.0
+        0.0,
+        "stiffness with which the person draws the gripper to the ball",
+        minimum=0.0,
+        maximum=1000.0,
+        origin=derived("secs. 3.5.1 and 3.5.2: only in the second experiment a person leads the arm"),
     )
     move_azimuth: Radian = parameter(
-        0.0, "turn about the arm's axis by which the hand moves on", minimum=-np.pi, maximum=np.pi
+        0.0,
+        "turn about the arm's axis by which the hand moves on",
+        minimum=-np.pi,
+        maximum=np.pi,
+        origin=derived("sec. 3.5.1: the hand holds the ball at one place"),
     )
-    move_height: Metre = parameter(0.0, "rise by which the hand moves on", minimum=-0.5, maximum=0.5)
-    move_from: Second = parameter(4.0, "time at which the hand moves on, if it does", minimum=0.0, maximum=600.0)
-    move_for: Second = parameter(2.0, "how long that takes", minimum=0.1, maximum=600.0)
-    click_noise: Pixel = parameter(0.5, "standard deviation of the calibration's clicks", minimum=0.0, maximum=50.0)
-    box_height: Metre = parameter(-0.8, "height of the calibration box's middle in W", minimum=-3.0, maximum=1.0)
+    move_height: Metre = parameter(
+        0.0,
+        "rise by which the hand moves on",
+        minimum=-0.5,
+        maximum=0.5,
+        origin=derived("sec. 3.5.1: the hand holds the ball at one place"),
+    )
+    move_from: Second = parameter(
+        4.0,
+        "time at which the hand moves on, if it does",
+        minimum=0.0,
+        maximum=600.0,
+        origin=assumed("own choice: while the arm approaches"),
+    )
+    move_for: Second = parameter(
+        2.0,
+        "how long that takes",
+        minimum=0.1,
+        maximum=600.0,
+        origin=assumed("own choice: an unhurried motion of a hand"),
+    )
+    click_noise: Pixel = parameter(
+        0.5,
+        "standard deviation of the calibration's clicks",
+        minimum=0.0,
+        maximum=50.0,
+        origin=assumed("own choice: a careful click; sec. 3.2.2 says only that corners are selected in the pictures"),
+    )
+    box_height: Metre = parameter(
+        -0.8,
+        "height of the calibration box's middle in W",
+        minimum=-3.0,
+        maximum=1.0,
+        origin=assumed("height of the box's middle in W, which stands below the arm, in both pictures"),
+    )
     camera_turn: Radian = parameter(
-        0.0, "angle by which the right camera was turned after calibration", minimum=-0.2, maximum=0.2
+        0.0,
+        "angle by which the right camera was turned after calibration",
+        minimum=-0.2,
+        maximum=0.2,
+        origin=derived("undisturbed: as calibrated"),
     )
-    light: Number = parameter(1.0, "brightness over the usual one", minimum=0.0, maximum=5.0)
-    sensor_noise: Levels = parameter(2.2, "standard deviation of the pictures' noise", minimum=0.0, maximum=60.0)
-    lost_pictures: Number = parameter(0.0, "part of the pictures that arrive black", minimum=0.0, maximum=1.0)
+    light: Number = parameter(
+        1.0,
+        "brightness over the usual one",
+        minimum=0.0,
+        maximum=5.0,
+        origin=derived("the usual brightness, by definition"),
+    )
+    sensor_noise: Levels = parameter(
+        2.2,
+        "standard deviation of the pictures' noise",
+        minimum=0.0,
+        maximum=60.0,
+        origin=assumed("own choice: a webcam's size of noise, of 255 levels"),
+    )
+    lost_pictures: Number = parameter(
+        0.0,
+        "part of the pictures that arrive black",
+        minimum=0.0,
+        maximum=1.0,
+        origin=derived("undisturbed: every picture arrives"),
+    )
     covered_markers: int = parameter(
-        0, "markers with tape over them, those that face the cameras first", minimum=0, maximum=8
+        0,
+        "markers with tape over them, those that face the cameras first",
+        minimum=0,
+        maximum=8,
+        origin=derived("undisturbed: no tape"),
     )
-    hide_from: Second = parameter(4.0, "time at which a card hides the ball, if it does", minimum=0.0, maximum=600.0)
+    hide_from: Second = parameter(
+        4.0,
+        "time at which a card hides the ball, if it does",
+        minimum=0.0,
+        maximum=600.0,
+        origin=assumed("own choice: while the arm approaches"),
+    )
     hide_for: Second = parameter(
-        0.0, "how long a card hides the ball from left and right camera", minimum=0.0, maximum=600.0
+        0.0,
+        "how long a card hides the ball from left and right camera",
+        minimum=0.0,
+        maximum=600.0,
+        origin=derived("undisturbed: no card"),
     )
-    cover: Cover = parameter(Cover.NONE, "camera whose lens is covered for a while")
-    cover_from: Second = parameter(4.0, "time at which the lens is covered", minimum=0.0, maximum=600.0)
-    cover_for: Second = parameter(2.0, "how long the lens is covered", minimum=0.0, maximum=600.0)
+    cover: Cover = parameter(
+        Cover.NONE, "camera whose lens is covered for a while", origin=derived("undisturbed: no lens is covered")
+    )
+    cover_from: Second = parameter(
+        4.0,
+        "time at which the lens is covered",
+        minimum=0.0,
+        maximum=600.0,
+        origin=assumed("own choice: while the arm approaches"),
+    )
+    cover_for: Second = parameter(
+        2.0, "how long the lens is covered", minimum=0.0, maximum=600.0, origin=assumed("own choice")
+    )
     jitter: Number = parameter(
-        0.0, "largest deviation of a control period, drawn evenly, as a part of it", minimum=0.0, maximum=0.9
+        0.0,
+        "largest deviation of a control period, drawn evenly, as a part of it",
+        minimum=0.0,
+        maximum=0.9,
+        origin=assumed("a period that is kept; the thesis's deviates by 0.02 to 0.18 s (table 1)"),
     )
 
     def covered(self, side: Cover) -> tuple[float, float]:
@@ -113,7 +237,7 @@ class Disturbances:
 
     def arm_values(self) -> dict[str, Any]:
         """Return what they set on the arm."""
-        arm = paper_values("helix", "arm")
+        arm = vars(ArmParams())
         return {
             "EA": self.arm_stiffness * arm["EA"],
             "EI": self.arm_stiffness * arm["EI"],

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handover.controllers.helix.servo.constant_curvature import W_FROM_B, forward_kinematics
+from handover.controllers.helix.servo.servo_parameters import Params as ServoParams
 from handover.cosim.blocks.geometry import rotation_of
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PlacedUnit
 from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
-from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.pictures import CameraPicture, Mark
 from handover.scenarios.helix.disturbances import Cover
 from handover.scenarios.helix.marked_pictures import is_covered, take_pictures
@@ -41,7 +41,7 @@ def model_mismatch(q_sys: Floats, p_WG_est: Floats) -> ModelMismatch:
         q_sys: commanded state, shape (9,), rad and m.
         p_WG_est: filtered measured position of the gripper in W, shape (3,), m.
     """
-    servo = paper_values("helix", "servo")
+    servo = vars(ServoParams())
     d_gripper = float(servo["d_gripper"])
     p_WG_sys = (W_FROM_B * forward_kinematics(q_sys, d_gripper))[3:]
     p_WG_calib = np.array([0.0, 0.0, -sum(servo["l_calib"]) - d_gripper])

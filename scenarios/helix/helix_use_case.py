@@ -11,6 +11,7 @@ import numpy as np
 from handover.controllers.helix.servo.constant_curvature import W_FROM_B
 from handover.controllers.helix.servo.jacobian_control import REACH_TOLERANCE, Limits, nearest_distance
 from handover.controllers.helix.servo.servo_parameters import Params as ServoParams
+from handover.cosim.blocks.origins import assumed
 from handover.cosim.blocks.ports import Floats, parameter
 from handover.cosim.blocks.units import Metre, Radian, Second
 from handover.cosim.record.reader import Record
@@ -41,16 +42,48 @@ class BowlPlace:
     """Where the bowl stands, and where the gripper lets the ball fall: above its middle."""
 
     bowl_azimuth: Radian = parameter(
-        -math.pi / 2, "direction of the bowl from the arm's axis, as of the ball", minimum=-math.pi, maximum=math.pi
+        -math.pi / 2,
+        "direction of the bowl from the arm's axis, as of the ball",
+        minimum=-math.pi,
+        maximum=math.pi,
+        origin=assumed(
+            "of the bowl's middle, about the arm's axis from +x; to the right of the cameras, where no hand was offered"
+        ),
     )
     bowl_distance: Metre = parameter(
-        0.16, "distance of the bowl's middle from the arm's axis", minimum=0.0, maximum=1.5
+        0.16,
+        "distance of the bowl's middle from the arm's axis",
+        minimum=0.0,
+        maximum=1.5,
+        origin=assumed("of the bowl's middle from the arm's axis: as far as the ball is offered"),
     )
-    bowl_height: Metre = parameter(-0.74, "height of the bowl's rim in W", minimum=-1.1, maximum=0.0)
-    bowl_radius: Metre = parameter(0.08, "radius of the bowl's rim", minimum=0.03, maximum=0.5)
-    drop_height: Metre = parameter(0.1, "height of the gripper over the rim as it opens", minimum=0.0, maximum=1.0)
+    bowl_height: Metre = parameter(
+        -0.74,
+        "height of the bowl's rim in W",
+        minimum=-1.1,
+        maximum=0.0,
+        origin=assumed("height of the bowl's rim in W; the hanging gripper is at -0.7 m"),
+    )
+    bowl_radius: Metre = parameter(
+        0.08,
+        "radius of the bowl's rim",
+        minimum=0.03,
+        maximum=0.5,
+        origin=assumed("of the rim; fig. 13 has a bowl of some three balls' width"),
+    )
+    drop_height: Metre = parameter(
+        0.1,
+        "height of the gripper over the rim as it opens",
+        minimum=0.0,
+        maximum=1.0,
+        origin=assumed("of the gripper over the rim as it opens"),
+    )
     carry_patience: Second = parameter(
-        60.0, "time after the hand let go by which the ball must fall", minimum=1.0, maximum=600.0
+        60.0,
+        "time after the hand let go by which the ball must fall",
+        minimum=1.0,
+        maximum=600.0,
+        origin=assumed("time after the hand let go by which the ball must fall"),
     )
 
     @property

@@ -1,4 +1,4 @@
-"""Parameters of the Helix handover; origins of the defaults are in `paper.toml`."""
+"""Parameters of the Helix handover."""
 
 import enum
 from dataclasses import dataclass
@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from handover.controllers.helix.servo.servo_parameters import Params as ServoParams
 from handover.controllers.helix.vision.vision_parameters import Detector
+from handover.cosim.blocks.origins import assumed, derived, stated
 from handover.cosim.blocks.ports import Floats, parameter
 from handover.cosim.blocks.units import Metre, Number, Radian, Second
 from handover.scenarios.experiment.live_inputs import Pushable
@@ -74,42 +76,131 @@ class WeightRule(enum.IntEnum):
 _FILTERS = ("filter_pictures", "use_covariance", "predict_motion", "gate", "Q_ball", "Q_wrist", "Q_direction")
 
 
+def settings_of(tuning: Tuning) -> dict[str, Any]:
+    """Return the controller's parameters of a tuning: what the thesis has, and for ours the defaults."""
+    thesis = paper_values("helix", "thesis")
+    return thesis if tuning is Tuning.THESIS else {name: getattr(ServoParams(), name) for name in thesis}
+
+
 @dataclass(frozen=True, kw_only=True)
 class Task:
     """Where the ball is offered, what the wrist carries, and how detector and controller are set."""
 
-    alpha: Number = parameter(0.25, "step size of the Jacobian control, eq. (21)", minimum=0.01, maximum=1.0)
-    place: HandPlace = parameter(HandPlace.FRONT, "where the hand offers the ball")
+    alpha: Number = parameter(
+        0.25,
+        "step size of the Jacobian control, eq. (21)",
+        minimum=0.01,
+        maximum=1.0,
+        origin=assumed("with control_period half of the way in a second: the averaged command trails by half a second"),
+    )
+    place: HandPlace = parameter(
+        HandPlace.FRONT, "where the hand offers the ball", origin=assumed("sec. 3.5.1: the first of its places")
+    )
     azimuth: Radian = parameter(
-        0.0, "turn of the offered ball about the arm's axis from that place, to the left", minimum=-np.pi, maximum=np.pi
+        0.0,
+        "turn of the offered ball about the arm's axis from that place, to the left",
+        minimum=-np.pi,
+        maximum=np.pi,
+        origin=derived("sec. 3.5.1: at the place itself"),
     )
-    radius: Metre = parameter(0.16, "distance of the offered ball from the arm's axis", minimum=0.0, maximum=2.0)
-    height: Metre = parameter(-0.6, "height of the offered ball in W", minimum=-1.1, maximum=0.0)
-    control_period: Second = parameter(0.5, "period of the controller", minimum=0.1, maximum=10.0)
-    threshold: Metre = parameter(0.05, "error at which the arm descends onto the ball", minimum=0.001, maximum=0.08)
-    tuning: Tuning = parameter(Tuning.OWN, "bounds and weights of the controller: ours, or the thesis's")
+    radius: Metre = parameter(
+        0.16,
+        "distance of the offered ball from the arm's axis",
+        minimum=0.0,
+        maximum=2.0,
+        origin=assumed(
+            "distance of the offered ball from the arm's axis; fig. 9 has the gripper 0.16 m from its start at the end"
+        ),
+    )
+    height: Metre = parameter(
+        -0.6,
+        "height of the offered ball in W",
+        minimum=-1.1,
+        maximum=0.0,
+        origin=assumed(
+            "height of the offered ball in W, 10 cm above the hanging gripper; figs. 4 and 6 show it "
+            "between wrist and gripper"
+        ),
+    )
+    control_period: Second = parameter(
+        0.5,
+        "period of the controller",
+        minimum=0.1,
+        maximum=10.0,
+        origin=assumed(
+            "the thesis's loop took 1.45 s of computing a step (table 1, alpha 0.4); this one needs a hundredth of that"
+        ),
+    )
+    threshold: Metre = parameter(
+        0.05,
+        "error at which the arm descends onto the ball",
+        minimum=0.001,
+        maximum=0.08,
+        origin=stated(
+            "appendix A, epsilon_threshold; the norm, as secs. 3.4 and 3.5 have it (algorithm 3 prints its square)"
+        ),
+    )
+    tuning: Tuning = parameter(
+        Tuning.OWN,
+        "bounds and weights of the controller: ours, or the thesis's",
+        origin=assumed("own choice: our settings; the thesis's are tuning=thesis"),
+    )
     filters: Filters = parameter(
-        Filters.TUNED, "filters of the measurements: those of the tuning, the thesis's, or ours"
+        Filters.TUNED,
+        "filters of the measurements: those of the tuning, the thesis's, or ours",
+        origin=assumed("own choice: the filters of the tuning"),
     )
-    step_rule: StepRule = parameter(StepRule.CONSTANT, "step size: alpha, or growing from it with the error")
+    step_rule: StepRule = parameter(
+        StepRule.CONSTANT,
+        "step size: alpha, or growing from it with the error",
+        origin=stated("sec. 5.4.4: the step sizes were constant"),
+    )
     bound_rule: BoundRule = parameter(
         BoundRule.CONSTANT,
         "bound of the estimate's pose: that of the tuning, or the filtered pose's deviation",
+        origin=stated("sec. 5.4.3: epsilon_pose_bound is a fixed value"),
     )
     weight_rule: WeightRule = parameter(
-        WeightRule.CONSTANT, "weights of the estimate: those of the tuning, or less where segments are long and bent"
+        WeightRule.CONSTANT,
+        "weights of the estimate: those of the tuning, or less where segments are long and bent",
+        origin=stated("sec. 5.4.3: A_pose_upd is fixed"),
     )
     cameras: CameraPlaces = parameter(
         CameraPlaces.BEHIND,
         "two behind the arm, the right one of them above or at the side instead, or a third one above",
+        origin=stated("sec. 3.2.1: beside each other, behind the arm"),
     )
     detector: Detector = parameter(
-        Detector.JOINT, "how ball and wrist are found: one fit to all that the cameras see, or the thesis's averages"
+        Detector.JOINT,
+        "how ball and wrist are found: one fit to all that the cameras see, or the thesis's averages",
+        origin=assumed(
+            "one fit to all that both cameras see; the thesis's own (sec. 3.2.3 and 3.2.4) is detector=published"
+        ),
     )
-    marker: Metre = parameter(0.02, "side of the wrist's markers", minimum=0.005, maximum=0.05)
-    rings: int = parameter(1, "rings of markers: a second one sits above the first", minimum=1, maximum=2)
-    decimation: int = parameter(3, "of 30 pictures a second, every so many-th is taken", minimum=1, maximum=30)
-    patience: Second = parameter(60.0, "time by which the gripper must begin to close", minimum=1.0, maximum=600.0)
+    marker: Metre = parameter(
+        0.02, "side of the wrist's markers", minimum=0.005, maximum=0.05, origin=stated("sec. 3.2.4")
+    )
+    rings: int = parameter(
+        1,
+        "rings of markers: a second one sits above the first",
+        minimum=1,
+        maximum=2,
+        origin=stated("sec. 3.2.4: a ring of markers around the wrist"),
+    )
+    decimation: int = parameter(
+        3,
+        "of 30 pictures a second, every so many-th is taken",
+        minimum=1,
+        maximum=30,
+        origin=assumed("own choice: ten pictures a second, five in a control period"),
+    )
+    patience: Second = parameter(
+        60.0,
+        "time by which the gripper must begin to close",
+        minimum=1.0,
+        maximum=600.0,
+        origin=assumed("own choice: of the thesis's runs with alpha 0.2 and 0.4 the slowest took 57.6 s (table 1)"),
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,9 +221,10 @@ class Parameters(Disturbances, Task):
     @property
     def settings(self) -> dict[str, Any]:
         """The controller's parameters of the tuning and the filters."""
-        values = dict(paper_values("helix", self.tuning.name.lower()))
+        values = settings_of(self.tuning)
         if self.filters is not Filters.TUNED:
-            values |= {name: paper_values("helix", self.filters.name.lower())[name] for name in _FILTERS}
+            filters = settings_of(Tuning[self.filters.name])
+            values |= {name: filters[name] for name in _FILTERS}
         if self.bound_rule is BoundRule.BY_COVARIANCE:
             values["bound_by_covariance"] = True
         if self.weight_rule is WeightRule.BY_STATE:

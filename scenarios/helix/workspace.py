@@ -11,6 +11,7 @@ import numpy as np
 from handover.controllers.helix.vision.markers import MarkerRing
 from handover.cosim.blocks.geometry import Pinhole
 from handover.cosim.blocks.ports import Floats
+from handover.plants.helix.arm.tendon_parameters import Params as ArmParams
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.helix.cameras import MIN_MARKER_SIDE, PICTURE, CameraPlaces, pinholes
 
@@ -37,7 +38,7 @@ def _sees(camera: Pinhole, p_WO: Floats, marker: float | None = None) -> bool:
 
 def _hidden(camera: Pinhole, p_WO: Floats, marker: float | None) -> str:
     """Return why a camera does not see ball and ring whole; "" if it does."""
-    values, d_gripper = paper_values("helix", "camera"), float(paper_values("helix", "arm")["d_gripper"])
+    values, d_gripper = paper_values("helix", "camera"), float(ArmParams().d_gripper)
     p_WR = p_WO + np.array([0.0, 0.0, d_gripper])
     depth_O, depth_R = (float(camera.depth(p)) for p in (p_WO, p_WR))
     if min(depth_O, depth_R) <= 0.0:

@@ -13,6 +13,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from handover.cosim.blocks.origins import assumed
 from handover.cosim.blocks.ports import Floats, parameter
 from handover.cosim.blocks.units import Metre, MetrePerSecond, Number, Radian
 from handover.cosim.record.reader import Record
@@ -55,18 +56,41 @@ class Finger(enum.IntEnum):
 class SensorParameters:
     """One approach to a face."""
 
-    finger: Finger = parameter(Finger.THUMB, "whose sensor looks at the face")
+    finger: Finger = parameter(
+        Finger.THUMB,
+        "whose sensor looks at the face",
+        origin=assumed("fig. 8 is of one sensor; of which is not stated"),
+    )
     reflectivity: Number = parameter(
-        1.0, "reflectivity of the face over that of the surface the curve is of", minimum=0.01, maximum=2.0
+        1.0,
+        "reflectivity of the face over that of the surface the curve is of",
+        minimum=0.01,
+        maximum=2.0,
+        origin=assumed("not given; of what fig. 8 was taken is not stated"),
     )
     incidence: Radian = parameter(
-        0.0, "angle between the beam and the normal of the face, which is met whole", minimum=-0.4, maximum=0.4
+        0.0,
+        "angle between the beam and the normal of the face, which is met whole",
+        minimum=-0.4,
+        maximum=0.4,
+        origin=assumed("not given; squarely"),
     )
-    first: Metre = parameter(0.085, "distance of the sensor from the face at the start", minimum=0.01, maximum=0.15)
+    first: Metre = parameter(
+        0.085,
+        "distance of the sensor from the face at the start",
+        minimum=0.01,
+        maximum=0.15,
+        origin=assumed("not given; beyond the operating range of sec. V-B"),
+    )
     last: Metre = parameter(
-        0.010, "distance at the end; nearer than about 9 mm another finger than the index touches", minimum=0.0
+        0.010,
+        "distance at the end; nearer than about 9 mm another finger than the index touches",
+        minimum=0.0,
+        origin=assumed("not given; where no finger touches the box, and the reflex's target distance"),
     )
-    speed: MetrePerSecond = parameter(0.005, "speed of the approach", minimum=1e-3, maximum=0.1)
+    speed: MetrePerSecond = parameter(
+        0.005, "speed of the approach", minimum=1e-3, maximum=0.1, origin=assumed("not given; 0.08 mm between scans")
+    )
 
 
 def bench_pose(p: SensorParameters, distance: float) -> tuple[Floats, float]:

@@ -1,4 +1,4 @@
-"""Parameters of the paths of the arm with variable-stiffness links; origins of the defaults are in `paper.toml`."""
+"""Parameters of the paths of the arm with variable-stiffness links."""
 
 import enum
 import math
@@ -13,6 +13,7 @@ from handover.controllers.vsl.learned_model import Learned
 from handover.controllers.vsl.paths import Segment
 from handover.controllers.vsl.trajectory_planner import Elbow, Path, segments_by
 from handover.controllers.vsl.waypoints import InvalidWaypoints
+from handover.cosim.blocks.origins import assumed, read_off, stated
 from handover.cosim.blocks.ports import Floats, Vector3, parameter
 from handover.cosim.blocks.schedule import InvalidSchedule, Schedule
 from handover.cosim.blocks.units import Kilogram, Metre, MetrePerSecond, Number, Pascal, Second
@@ -66,63 +67,132 @@ REGULATOR_STEP = MAX_PRESSURE / 255.0
 class Parameters:
     """One run along a path, controlled by rigid-link kinematics."""
 
-    path: Path = parameter(Path.CURVE, "path of the tip; custom is a straight line from x_0 to x_g, or by waypoints")
+    path: Path = parameter(
+        Path.CURVE,
+        "path of the tip; custom is a straight line from x_0 to x_g, or by waypoints",
+        origin=stated("sec. V-B: the path of experiment 2; sec. V-A has linear, curve and square"),
+    )
     waypoints: str = parameter(
         "",
         "CSV file of a custom path's waypoints in W, m: columns x, y, z, and via_x, via_y, via_z for arcs; empty: x_0 "
         "and x_g",
+        origin=assumed("the paper's paths are given in sec. V-A; this is for one's own"),
     )
     load: Kilogram = parameter(
-        0.075, "mass that hangs at the gripper; the paper's are 0 to 0.1 kg", minimum=0.0, maximum=_MAX_LOAD
+        0.075,
+        "mass that hangs at the gripper; the paper's are 0 to 0.1 kg",
+        minimum=0.0,
+        maximum=_MAX_LOAD,
+        origin=stated("sec. V-C: 75 g with 0.5 bar, the harder case of experiment 2"),
     )
     load_steps: str = parameter(
-        "", "masses, kg, that hang there from some times on, s, in place of load, as '8:0.05 12:0'; empty: none"
+        "",
+        "masses, kg, that hang there from some times on, s, in place of load, as '8:0.05 12:0'; empty: none",
+        origin=assumed("the paper's loads hang throughout a path"),
     )
     pressure: Pascal = parameter(
         5e4,
         "pressure inside both links: 5e4 Pa is 0.5 bar; the paper's are 0.5 to 2 bar",
         minimum=0.0,
         maximum=MAX_PRESSURE,
+        origin=stated("sec. V-C: 0.5 bar with 75 g, the harder case of experiment 2"),
     )
     pressure_difference: Pascal = parameter(
         0.0,
         "pressure inside link 3 less that inside link 2, which is then `pressure`",
         minimum=-MAX_PRESSURE,
         maximum=MAX_PRESSURE,
+        origin=assumed("sec. V-C names one pressure for both links"),
     )
     pressure_steps: str = parameter(
         "",
         "pressures, Pa, from some times on, s, of both links or each, as '8:1e5 12:5e4,2e5'; empty: none",
+        origin=assumed("the paper's pressures hold throughout a path"),
     )
     links: Links = parameter(
-        Links.VSL, "links of variable stiffness, printed rigid ones of the same length, or one of each, link 2 first"
+        Links.VSL,
+        "links of variable stiffness, printed rigid ones of the same length, or one of each, link 2 first",
+        origin=stated("sec. II-A: links can be exchanged with printed rigid ones of the same weight"),
     )
-    motion: Motion = parameter(Motion.QUASI_STATIC, "arm in equilibrium at every instant, or with its oscillations")
+    motion: Motion = parameter(
+        Motion.QUASI_STATIC,
+        "arm in equilibrium at every instant, or with its oscillations",
+        origin=assumed("slow point-to-point motion; the paper's figures show no oscillation"),
+    )
     resolution: Resolution = parameter(
         Resolution.IDEAL,
         "ideal, or the robot's electronics: a stepper at the base, counts of encoders, 16 and 8 bits for pressures",
+        origin=assumed("sec. II-B names converters, but neither ranges nor steps; errors of the figures are larger"),
     )
-    speed: MetrePerSecond = parameter(0.05, "speed of the tip along the path, V", minimum=0.001, maximum=0.5)
-    points: int = parameter(100, "points of each segment of the path, N", minimum=1, maximum=10000)
+    speed: MetrePerSecond = parameter(
+        0.05,
+        "speed of the tip along the path, V",
+        minimum=0.001,
+        maximum=0.5,
+        origin=assumed("V of algorithms 1 and 2 is not given"),
+    )
+    points: int = parameter(
+        100,
+        "points of each segment of the path, N",
+        minimum=1,
+        maximum=10000,
+        origin=assumed("N of algorithms 1 and 2 is not given; steps of 1 to 3 mm"),
+    )
     settle: Second = parameter(
-        5.0, "time before the path, for getting to its start and calming down", minimum=0.0, maximum=600.0
+        5.0,
+        "time before the path, for getting to its start and calming down",
+        minimum=0.0,
+        maximum=600.0,
+        origin=assumed(
+            "half a turn of a joint at 0.8 rad/s, and a second; algorithms 1 and 2 begin with Move(q_k, dq_0)"
+        ),
     )
-    elbow: Elbow = parameter(Elbow.UP, "which way it points; down, it is below the ground on the paper's paths")
+    elbow: Elbow = parameter(
+        Elbow.UP,
+        "which way it points; down, it is below the ground on the paper's paths",
+        origin=read_off("fig. 1(a) shows the elbow above the line from shoulder to tip"),
+    )
     x_0: Vector3[Metre] = parameter(
-        np.array([0.30, 0.0, 0.05]), "start of a custom path in W, z at least 0", minimum=-1.0, maximum=1.0
+        np.array([0.30, 0.0, 0.05]),
+        "start of a custom path in W, z at least 0",
+        minimum=-1.0,
+        maximum=1.0,
+        origin=assumed("start of a path of one's own; the paper's curve starts there"),
     )
     x_g: Vector3[Metre] = parameter(
-        np.array([0.40, 0.0, 0.15]), "end of a custom path in W, z at least 0", minimum=-1.0, maximum=1.0
+        np.array([0.40, 0.0, 0.15]),
+        "end of a custom path in W, z at least 0",
+        minimum=-1.0,
+        maximum=1.0,
+        origin=assumed("end of a path of one's own; middle of the paper's curve"),
     )
     EI_factor: Number = parameter(
-        1.0, "bending stiffness of both links over that of the arm that was trained on", minimum=0.1, maximum=10.0
+        1.0,
+        "bending stiffness of both links over that of the arm that was trained on",
+        minimum=0.1,
+        maximum=10.0,
+        origin=assumed("one arm was built; others are of one's own"),
     )
-    mass_factor: Number = parameter(1.0, "mass of both links over that of the trained arm", minimum=0.0, maximum=10.0)
+    mass_factor: Number = parameter(
+        1.0,
+        "mass of both links over that of the trained arm",
+        minimum=0.0,
+        maximum=10.0,
+        origin=assumed("one arm was built; others are of one's own"),
+    )
     friction_factor: Number = parameter(
-        1.0, "friction of all gears over that of the trained arm", minimum=0.0, maximum=100.0
+        1.0,
+        "friction of all gears over that of the trained arm",
+        minimum=0.0,
+        maximum=100.0,
+        origin=assumed("one arm was built; others are of one's own"),
     )
     joint_factor: Number = parameter(
-        1.0, "stiffness of J2 and J3 behind their encoders over that of the trained arm", minimum=0.01, maximum=1e3
+        1.0,
+        "stiffness of J2 and J3 behind their encoders over that of the trained arm",
+        minimum=0.01,
+        maximum=1e3,
+        origin=assumed("one arm was built; others are of one's own"),
     )
     arm_scatter: Number = parameter(
         0.0,
@@ -130,13 +200,24 @@ class Parameters:
         "stiffness differ besides",
         minimum=0.0,
         maximum=0.5,
+        origin=assumed("one arm was built, whose scatter is not given"),
     )
     length_scatter: Metre = parameter(
-        0.0, "standard deviation by which the length of each link differs", minimum=0.0, maximum=0.01
+        0.0,
+        "standard deviation by which the length of each link differs",
+        minimum=0.0,
+        maximum=0.01,
+        origin=assumed("one arm was built, whose scatter is not given"),
     )
-    arm_seed: int = parameter(0, "which arm of those that scatter; apart from the run's seed", minimum=0)
+    arm_seed: int = parameter(
+        0, "which arm of those that scatter; apart from the run's seed", minimum=0, origin=assumed("own choice")
+    )
     tolerance: Metre = parameter(
-        0.06, "largest mean error of the tip for which the run counts as a success", minimum=0.0, maximum=1.0
+        0.06,
+        "largest mean error of the tip for which the run counts as a success",
+        minimum=0.0,
+        maximum=1.0,
+        origin=assumed("half more than the mean error of the default run, so that heavier loads are distinguished"),
     )
 
     @property
@@ -257,22 +338,45 @@ class HybridParameters(Parameters):
     links: Links = parameter(
         Links.VSL,
         "links of variable stiffness, or rigid ones, of which the model that ships knows nothing; or one of each",
+        origin=stated("sec. II-A: links can be exchanged with printed rigid ones of the same weight"),
     )
     tolerance: Metre = parameter(
-        0.005, "largest mean error of the tip for which the run counts as a success", minimum=0.0, maximum=1.0
+        0.005,
+        "largest mean error of the tip for which the run counts as a success",
+        minimum=0.0,
+        maximum=1.0,
+        origin=assumed("about the mean error of the arm with rigid links, which the hybrid is to beat (sec. V-C)"),
     )
     learned: Learned = parameter(
-        Learned.CUBIC, "what corrects: polynomials, a small network, the paper's, which needs a model, or a beam"
+        Learned.CUBIC,
+        "what corrects: polynomials, a small network, the paper's, which needs a model, or a beam",
+        origin=assumed("sec. IV-B has networks; polynomials of third degree learn the same from fewer points"),
     )
-    model: str = parameter("", "file of a trained model; empty: the one that ships")
+    model: str = parameter(
+        "",
+        "file of a trained model; empty: the one that ships",
+        origin=assumed("the trained model that ships; the paper's is not public"),
+    )
     friction_compensation: bool = parameter(
-        False, "whether the direction of motion separates the gears' friction from the load"
+        False,
+        "whether the direction of motion separates the gears' friction from the load",
+        origin=stated("sec. VI names time series of data as future work"),
     )
-    closed_loop: bool = parameter(False, "whether the controller also gets the tip's position from the tracker")
+    closed_loop: bool = parameter(
+        False,
+        "whether the controller also gets the tip's position from the tracker",
+        origin=stated("sec. VI names closed-loop control as future work; the paper's is open loop"),
+    )
     imu: Imu = parameter(
-        Imu.NONE, "IMUs at the links' ends: none, to monitor what was learned, or feedback by them, too"
+        Imu.NONE,
+        "IMUs at the links' ends: none, to monitor what was learned, or feedback by them, too",
+        origin=stated("sec. VI names IMUs as future work; the paper's arm has none"),
     )
-    vibration_damping: bool = parameter(False, "whether joints are turned against swings that changes of speed excite")
+    vibration_damping: bool = parameter(
+        False,
+        "whether joints are turned against swings that changes of speed excite",
+        origin=stated("sec. VI names models of the dynamics as future work"),
+    )
 
     @property
     def is_monitored(self) -> bool:

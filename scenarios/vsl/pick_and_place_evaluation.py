@@ -1,4 +1,4 @@
-"""Parameters of a pick and place, and its evaluation by ground truth; origins of the defaults are in `paper.toml`."""
+"""Parameters of a pick and place, and its evaluation by ground truth."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -7,6 +7,7 @@ import numpy as np
 
 from handover.controllers.vsl.hybrid_kinematics import Method
 from handover.controllers.vsl.pick_and_place import PHASES, TaskPhase
+from handover.cosim.blocks.origins import assumed
 from handover.cosim.blocks.ports import Floats, Vector3, parameter
 from handover.cosim.blocks.units import Kilogram, Metre, MetrePerSecond, Pascal, Second
 from handover.cosim.system.signals import Signals
@@ -34,30 +35,87 @@ _HANGING = (TaskPhase.LIFT, *_ON_THE_WAY)
 class PickAndPlaceParameters:
     """One object that is picked up and put down."""
 
-    mass: Kilogram = parameter(0.05, "mass of the object", minimum=0.0, maximum=0.3)
+    mass: Kilogram = parameter(
+        0.05, "mass of the object", minimum=0.0, maximum=0.3, origin=assumed("within the loads of sec. V-C, 0 to 100 g")
+    )
     pick: Vector3[Metre] = parameter(
-        np.array([0.30, 0.0, 0.06]), "top of the object at the start in W", minimum=-1.0, maximum=1.0
+        np.array([0.30, 0.0, 0.06]),
+        "top of the object at the start in W",
+        minimum=-1.0,
+        maximum=1.0,
+        origin=assumed(
+            "where the curve of sec. V-A begins, on an object of some centimetres; no such experiment is published"
+        ),
     )
     place: Vector3[Metre] = parameter(
-        np.array([0.36, 0.0, 0.06]), "where it is to be put down, in W; as high as pick", minimum=-1.0, maximum=1.0
+        np.array([0.36, 0.0, 0.06]),
+        "where it is to be put down, in W; as high as pick",
+        minimum=-1.0,
+        maximum=1.0,
+        origin=assumed("farther out, where the arm sags more"),
     )
     contact_pressure: Pascal = parameter(
-        5e4, "pressure in both links near contacts: 5e4 Pa is 0.5 bar", minimum=0.0, maximum=MAX_PRESSURE
+        5e4,
+        "pressure in both links near contacts: 5e4 Pa is 0.5 bar",
+        minimum=0.0,
+        maximum=MAX_PRESSURE,
+        origin=assumed("0.5 bar, the softest of sec. V-C"),
     )
     carry_pressure: Pascal = parameter(
-        2e5, "pressure in both links while the arm lifts and carries", minimum=0.0, maximum=MAX_PRESSURE
+        2e5,
+        "pressure in both links while the arm lifts and carries",
+        minimum=0.0,
+        maximum=MAX_PRESSURE,
+        origin=assumed("2 bar, the stiffest of sec. V-C"),
     )
-    contact_speed: MetrePerSecond = parameter(0.03, "speed at which the tip comes down", minimum=0.005, maximum=0.3)
-    speed: MetrePerSecond = parameter(0.1, "speed at which it lifts and carries", minimum=0.005, maximum=0.3)
-    hover: Metre = parameter(0.08, "how far above the object it travels", minimum=0.02, maximum=0.3)
-    press: Metre = parameter(0.008, "how far below the top it is commanded", minimum=0.0, maximum=0.05)
-    settle: Second = parameter(4.0, "time above the object before it comes down", minimum=0.0, maximum=600.0)
-    wait: Second = parameter(1.5, "time for pressures and the cup to follow", minimum=0.0, maximum=60.0)
+    contact_speed: MetrePerSecond = parameter(
+        0.03,
+        "speed at which the tip comes down",
+        minimum=0.005,
+        maximum=0.3,
+        origin=assumed("slow; speeds are not given"),
+    )
+    speed: MetrePerSecond = parameter(
+        0.1,
+        "speed at which it lifts and carries",
+        minimum=0.005,
+        maximum=0.3,
+        origin=assumed("twice that of the paths"),
+    )
+    hover: Metre = parameter(
+        0.08,
+        "how far above the object it travels",
+        minimum=0.02,
+        maximum=0.3,
+        origin=assumed("clear of the object by more than what the arm sags, and swings, as it turns soft"),
+    )
+    press: Metre = parameter(
+        0.008,
+        "how far below the top it is commanded",
+        minimum=0.0,
+        maximum=0.05,
+        origin=assumed("more than the error of the corrected tip, so that it touches for certain"),
+    )
+    settle: Second = parameter(
+        4.0,
+        "time above the object before it comes down",
+        minimum=0.0,
+        maximum=600.0,
+        origin=assumed("as for the paths, a second less: the arm starts nearby"),
+    )
+    wait: Second = parameter(
+        1.5,
+        "time for pressures and the cup to follow",
+        minimum=0.0,
+        maximum=60.0,
+        origin=assumed("six times the regulator's time constant"),
+    )
     tolerance: Metre = parameter(
         0.01,
         "how far from its place the object may be, and be dragged over the table, for the run to count as a success",
         minimum=0.0,
         maximum=1.0,
+        origin=assumed("a quarter of the object's width; the tip of the trained arm has an error of 2 mm"),
     )
 
     @property

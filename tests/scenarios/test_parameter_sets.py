@@ -7,26 +7,20 @@ from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.start_values import fault_of
 from handover.cosim.blocks.variable import Variable
 from handover.fmus.catalog import UNITS, import_class
+from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.experiment.parameter_sets import parameter_sets
 
-_CAMERAS = "distortion_{0} intrinsics_{0} p_WC_{0} q_WC_{0}"
-_LENSES = " ".join(_CAMERAS.format(side) for side in ("left", "right", "third"))
-IN_NEITHER = {
-    "HandoverPartner": "bowl_depth seed",
-    "StereoCamera": f"{_LENSES} bowl_depth bowl_radius p_WD seed",
-    "FingerInfrared": "seed",
-    "HandoverVision": f"{_LENSES} apothem ball_radius d_gripper decimation detector has_third marker rings",
-    "VisualServo": "alpha carry_after control_period seed threshold_drop",
+STATUSES = {"stated", "derived", "assumed", "read off figure"}
+WITHOUT_ORIGIN = {
+    **dict.fromkeys(
+        ("HandoverPartner", "StereoCamera", "FingerInfrared", "VisualServo", "Navigation", "HandAndObject"), "seed"
+    ),
+    **dict.fromkeys(("LargeObjectAndHands", "GraspScene"), "seed"),
     "VslArm": "high_frequency_damping hinges hinges_dynamic link_2 link_3 motion seed substep",
     "TrajectoryPlanner": "elbow path pressure waypoints x_0 x_g",
     "HybridKinematics": "elbow method",
-    "Navigation": "seed",
-    "HandAndObject": "seed",
-    "LargeObjectAndHands": "seed",
-    "ArmImpedanceController": "joints",
-    "GraspScene": "seed",
 }
-"""Parameters of units that are neither published nor assumed: `paper.toml` lacks them or gives another value."""
+"""Parameters of units that are neither published nor assumed: seeds, numerical ones, and what scenarios set."""
 
 
 def declared(unit: str) -> dict[str, Variable]:
@@ -47,7 +41,13 @@ def test_the_sets_of_a_unit_fit_have_origins_and_hold_all_defaults_but_the_excep
             start = parameters[name].start
             assert value == start.name.lower() if parameters[name].items else np.array_equal(value, start), name
     found = {name for s in sets if s.name in ("published", "assumed") for name in s.values}
-    assert set(parameters) - found == set(IN_NEITHER.get(unit, "").split())
+    assert set(parameters) - found == set(WITHOUT_ORIGIN.get(unit, "").split())
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_every_parameter_of_a_scenario_has_an_origin(scenario: str):
+    origins = [v.origin for v in SCENARIOS[scenario].parameters()]
+    assert all(origin and origin.where and origin.status in STATUSES for origin in origins)
 
 
 def test_published_gains_and_our_own_are_sets_of_their_own():

@@ -14,6 +14,7 @@ from handover.controllers.helix.reflex.offset_filter import Doubts, OffsetFilter
 from handover.controllers.helix.servo.arm_motion import FirstOrderLag, Response
 from handover.controllers.helix.servo.constant_curvature import W_FROM_B, linearise, orientation, state_of
 from handover.cosim.blocks.block import InvalidParameters
+from handover.cosim.blocks.origins import assumed, stated
 from handover.cosim.blocks.ports import Floats, Matrix3, Vector3, Vector6, Vector9, output, parameter, port
 from handover.cosim.blocks.start_values import parameter_faults
 from handover.cosim.blocks.state import pack_state, unpack_state
@@ -58,61 +59,194 @@ class Source(enum.IntEnum):
 class Params:
     """The controller's own model of arm, fingers and sensors, and its doubts; all assumed."""
 
-    feels: bool = parameter(True, "take in what the fingers read; false: cameras and motors alone")
-    a: Metre = parameter(0.062, "a of the characteristic y = a exp(b x) + c exp(d x)", minimum=1e-6, maximum=1.0)
-    b: PerTick = parameter(-0.0030, "b of the characteristic", minimum=-0.1, maximum=-1e-9)
-    c: Metre = parameter(0.022, "c of the characteristic", minimum=1e-6, maximum=1.0)
-    d: PerTick = parameter(-0.00043, "d of the characteristic", minimum=-0.1, maximum=-1e-9)
-    nearest: Metre = parameter(0.004, "distance of the largest reading", minimum=1e-4, maximum=0.1)
-    farthest: Metre = parameter(0.065, "distance beyond which nothing is seen", minimum=1e-3, maximum=0.15)
-    contact: Number = parameter(0.4, "share of the largest reading that is left at contact", minimum=0.0, maximum=1.0)
-    beam: Radian = parameter(0.35, "half the opening angle of a sensor's beam", minimum=0.0, maximum=0.7)
+    feels: bool = parameter(
+        True, "take in what the fingers read; false: cameras and motors alone", origin=assumed("the scenario's reflex")
+    )
+    a: Metre = parameter(
+        0.062,
+        "a of the characteristic y = a exp(b x) + c exp(d x)",
+        minimum=1e-6,
+        maximum=1.0,
+        origin=assumed("what the sensors were characterised with"),
+    )
+    b: PerTick = parameter(
+        -0.0030,
+        "b of the characteristic",
+        minimum=-0.1,
+        maximum=-1e-9,
+        origin=assumed("what the sensors were characterised with"),
+    )
+    c: Metre = parameter(
+        0.022,
+        "c of the characteristic",
+        minimum=1e-6,
+        maximum=1.0,
+        origin=assumed("what the sensors were characterised with"),
+    )
+    d: PerTick = parameter(
+        -0.00043,
+        "d of the characteristic",
+        minimum=-0.1,
+        maximum=-1e-9,
+        origin=assumed("what the sensors were characterised with"),
+    )
+    nearest: Metre = parameter(
+        0.004,
+        "distance of the largest reading",
+        minimum=1e-4,
+        maximum=0.1,
+        origin=stated("[Luberto] sec. V-B: 4 to 65 mm"),
+    )
+    farthest: Metre = parameter(
+        0.065,
+        "distance beyond which nothing is seen",
+        minimum=1e-3,
+        maximum=0.15,
+        origin=stated("[Luberto] sec. V-B: 4 to 65 mm"),
+    )
+    contact: Number = parameter(
+        0.4,
+        "share of the largest reading that is left at contact",
+        minimum=0.0,
+        maximum=1.0,
+        origin=assumed("own: such sensors' readings fall below their operating range; how far is assumed"),
+    )
+    beam: Radian = parameter(
+        0.35, "half the opening angle of a sensor's beam", minimum=0.0, maximum=0.7, origin=assumed("own, assumed")
+    )
     across: Radian = parameter(
         -0.23,
         "angle of the first sensor's beam from the normal of the finger's last link, towards its tip",
         minimum=-1.5,
         maximum=1.5,
+        origin=assumed("as built"),
     )
-    ahead: Radian = parameter(0.47, "angle of the second sensor's beam from that normal", minimum=-1.5, maximum=1.5)
-    ball_radius: Metre = parameter(0.025, "expected radius of the ball", minimum=0.001, maximum=0.1)
+    ahead: Radian = parameter(
+        0.47,
+        "angle of the second sensor's beam from that normal",
+        minimum=-1.5,
+        maximum=1.5,
+        origin=assumed("as built"),
+    )
+    ball_radius: Metre = parameter(
+        0.025, "expected radius of the ball", minimum=0.001, maximum=0.1, origin=assumed("known, as to the cameras")
+    )
     palm_radius: Metre = parameter(
-        0.045, "how far the palm under the ball is expected to reach", minimum=0.0, maximum=0.2
+        0.045,
+        "how far the palm under the ball is expected to reach",
+        minimum=0.0,
+        maximum=0.2,
+        origin=assumed("an open hand's"),
     )
     palm_reflectivity: Number = parameter(
-        0.6, "expected reflectivity of the palm over the reference's; 0: there is none", minimum=0.0, maximum=2.0
+        0.6,
+        "expected reflectivity of the palm over the reference's; 0: there is none",
+        minimum=0.0,
+        maximum=2.0,
+        origin=assumed("skin, in the near infrared"),
     )
-    ticks_min: Tick = parameter(20.0, "reading from which on a sensor sees", minimum=1.0, maximum=4095.0)
-    sensors_min: int = parameter(2, "sensors that must see before readings are taken in", minimum=1, maximum=6)
+    ticks_min: Tick = parameter(
+        20.0,
+        "reading from which on a sensor sees",
+        minimum=1.0,
+        maximum=4095.0,
+        origin=assumed("five standard deviations of a reading's noise"),
+    )
+    sensors_min: int = parameter(
+        2,
+        "sensors that must see before readings are taken in",
+        minimum=1,
+        maximum=6,
+        origin=assumed("of one sensor's reading no direction follows"),
+    )
     near: Metre = parameter(
-        0.12, "distance of ball and gripper within which it is reckoned on where cameras fail", minimum=0.0, maximum=1.0
+        0.12,
+        "distance of ball and gripper within which it is reckoned on where cameras fail",
+        minimum=0.0,
+        maximum=1.0,
+        origin=assumed("the gripper's fingers reach the ball from there, as its hand's model has it"),
     )
     lost: Metre = parameter(
         0.04,
         "standard deviation of the offset at which a ball that cameras do not see is lost",
         minimum=0.0,
         maximum=1.0,
+        origin=assumed("more than open fingers leave room for"),
     )
     slip: Number = parameter(
-        0.3, "doubt of the gripper's motion, as a part of the commanded one", minimum=0.0, maximum=2.0
+        0.3,
+        "doubt of the gripper's motion, as a part of the commanded one",
+        minimum=0.0,
+        maximum=2.0,
+        origin=assumed("by what the arm makes of commands far out, where tendons are slack: 0.3 to 1"),
     )
     wander: Metre = parameter(
-        0.003, "doubt of the offset after a second in which nothing is commanded", minimum=1e-6, maximum=0.1
+        0.003,
+        "doubt of the offset after a second in which nothing is commanded",
+        minimum=1e-6,
+        maximum=0.1,
+        origin=assumed("the hand's drift, and the arm's sway"),
     )
-    bias: Metre = parameter(0.002, "doubt of the cameras' offset of ball and gripper", minimum=1e-6, maximum=0.1)
+    bias: Metre = parameter(
+        0.002,
+        "doubt of the cameras' offset of ball and gripper",
+        minimum=1e-6,
+        maximum=0.1,
+        origin=assumed("calibration by clicks of half a pixel"),
+    )
     brightness: Number = parameter(
-        0.3, "doubt of the logarithms of the reflectivities of ball and palm", minimum=1e-6, maximum=3.0
+        0.3,
+        "doubt of the logarithms of the reflectivities of ball and palm",
+        minimum=1e-6,
+        maximum=3.0,
+        origin=assumed("a factor of 1.35 either way"),
     )
-    reading: Number = parameter(0.1, "doubt of a reading, as a part of it", minimum=0.0, maximum=2.0)
-    noise: Tick = parameter(4.0, "standard deviation of a reading", minimum=0.1, maximum=1000.0)
-    memory: Second = parameter(0.5, "time for which errors of readings stay alike", minimum=0.0, maximum=60.0)
-    d_gripper: Metre = parameter(0.10, "distance of wrist and gripper", minimum=1e-3, maximum=1.0)
-    d_tendon: Metre = parameter(0.035, "distance of the tendons from the arm's axis", minimum=1e-3, maximum=0.5)
+    reading: Number = parameter(
+        0.1,
+        "doubt of a reading, as a part of it",
+        minimum=0.0,
+        maximum=2.0,
+        origin=assumed("gains, incidence, and what else returns light"),
+    )
+    noise: Tick = parameter(
+        4.0, "standard deviation of a reading", minimum=0.1, maximum=1000.0, origin=assumed("as the converter's")
+    )
+    memory: Second = parameter(
+        0.5,
+        "time for which errors of readings stay alike",
+        minimum=0.0,
+        maximum=60.0,
+        origin=assumed("of gains for good, of the rest as long as the arm's half swing"),
+    )
+    d_gripper: Metre = parameter(
+        0.10, "distance of wrist and gripper", minimum=1e-3, maximum=1.0, origin=stated("sec. 3.2.4, appendix A")
+    )
+    d_tendon: Metre = parameter(
+        0.035,
+        "distance of the tendons from the arm's axis",
+        minimum=1e-3,
+        maximum=0.5,
+        origin=assumed("not given: radius on which the tendons lie"),
+    )
     l_calib: Vector3[Metre] = parameter(
-        np.array([0.12, 0.24, 0.24]), "segment lengths after calibration", minimum=1e-3, maximum=2.0
+        np.array([0.12, 0.24, 0.24]),
+        "segment lengths after calibration",
+        minimum=1e-3,
+        maximum=2.0,
+        origin=stated("sec. 3.1"),
     )
-    response_time: Second = parameter(0.15, "time in which most of a commanded motion comes", minimum=0.001)
+    response_time: Second = parameter(
+        0.15,
+        "time in which most of a commanded motion comes",
+        minimum=0.001,
+        origin=assumed("own choice: about the lag of motors and arm"),
+    )
     least_response: Number = parameter(
-        0.3, "least part of the commanded motion that the arm is taken to make", minimum=0.01, maximum=1.0
+        0.3,
+        "least part of the commanded motion that the arm is taken to make",
+        minimum=0.01,
+        maximum=1.0,
+        origin=assumed("an arm with slack tendons makes a tenth to a half of what it is commanded to"),
     )
 
     def check(self) -> None:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from handover.cosim.blocks.block import InvalidParameters
+from handover.cosim.blocks.origins import assumed, derived, stated
 from handover.cosim.blocks.ports import Vector3, Vector6, Vector9, parameter
 from handover.cosim.blocks.start_values import parameter_faults
 from handover.cosim.blocks.units import Metre, Number, Radian, Second, SquareMetre
@@ -44,49 +45,85 @@ class Params:
     """
 
     control_period: Second = parameter(
-        0.5, "time between two updates of the command (own; thesis: 1.45)", minimum=0.01, maximum=60.0
+        0.5,
+        "time between two updates of the command (own; thesis: 1.45)",
+        minimum=0.01,
+        maximum=60.0,
+        origin=assumed(
+            "the thesis's loop took 1.45 s of computing a step (table 1, alpha 0.4); this one needs a hundredth of that"
+        ),
     )
     jitter: Number = parameter(
         0.0,
         "largest deviation of a control period, drawn evenly, as a part of it (own choice)",
         minimum=0.0,
         maximum=0.9,
+        origin=assumed("a period that is kept; the thesis's deviates by 0.02 to 0.18 s (table 1)"),
     )
     seed: int = parameter(0, "seed of the jitter", minimum=0)
     alpha: Number = parameter(
-        0.25, "step size: part of the way to the goal in a control period", minimum=0.0, maximum=1.0
+        0.25,
+        "step size: part of the way to the goal in a control period",
+        minimum=0.0,
+        maximum=1.0,
+        origin=assumed("with control_period half of the way in a second: the averaged command trails by half a second"),
     )
     adaptive_step: bool = parameter(
-        False, "let the step grow with the error e: min(0.8, max(alpha, 0.8 e / (e + 0.08 m))) (own choice)"
+        False,
+        "let the step grow with the error e: min(0.8, max(alpha, 0.8 e / (e + 0.08 m))) (own choice)",
+        origin=stated("sec. 5.4.4: the step sizes were constant"),
     )
-    d_gripper: Metre = parameter(0.10, "distance of wrist and gripper", minimum=0.0)
-    d: Metre = parameter(0.035, "distance of the tendons from the axis (own choice)", minimum=0.0)
-    l_calib: Vector3[Metre] = parameter(np.array([0.12, 0.24, 0.24]), "segment lengths after calibration", minimum=0.0)
+    d_gripper: Metre = parameter(
+        0.10, "distance of wrist and gripper", minimum=0.0, origin=stated("sec. 3.2.4, appendix A")
+    )
+    d: Metre = parameter(
+        0.035,
+        "distance of the tendons from the axis (own choice)",
+        minimum=0.0,
+        origin=assumed("not given: radius on which the tendons lie"),
+    )
+    l_calib: Vector3[Metre] = parameter(
+        np.array([0.12, 0.24, 0.24]), "segment lengths after calibration", minimum=0.0, origin=stated("sec. 3.1")
+    )
     L_sys_LB: Vector6[Number] = parameter(
         np.array([0.0, 0.08, 0.0, 0.16, 0.0, 0.16]),
         "lower bounds of d_1, l_1, d_2, l_2, d_3, l_3 (rad, m)",
         minimum=0.0,
+        origin=stated("eq. (11): d_1, l_1, d_2, l_2, d_3, l_3, in rad and m"),
     )
     L_sys_UB: Vector6[Number] = parameter(
         np.array([math.pi / 4, 0.14, math.pi / 2, 0.26, math.pi / 2, 0.26]),
         "upper bounds of d_1, l_1, d_2, l_2, d_3, l_3 (rad, m)",
         minimum=0.0,
+        origin=stated("eq. (11): d_1, l_1, d_2, l_2, d_3, l_3, in rad and m"),
     )
     A_pose_upd: Vector9[Number] = parameter(
         np.array([1.0, 1.0, 5.0, 1.05, 1.05, 5.25, 1.1, 1.1, 5.5]),
         "weight of each state's distance from the command in the estimate (own; thesis: lengths 1, 1.05, 1.1)",
         minimum=0.0,
+        origin=assumed(
+            "the thesis's, lengths weighted five times more: as stated, sag is explained by segments of "
+            "half their length"
+        ),
     )
     K_initialize: Vector9[Number] = parameter(
         np.array([0.2, 0.2, 10.0, 0.1, 0.1, 5.0, 0.1, 0.1, 5.0]),
         "virtual stiffness (diagonal; own; thesis: lengths 2, 1, 1)",
         minimum=0.0,
+        origin=assumed("the thesis's, lengths five times stiffer: longer segments have slack tendons"),
     )
     epsilon_pose_bound: Metre = parameter(
-        0.0001, "distance of the estimate's pose from the measured one (own; thesis: 0.005)", minimum=0.0
+        0.0001,
+        "distance of the estimate's pose from the measured one (own; thesis: 0.005)",
+        minimum=0.0,
+        origin=assumed(
+            "the loop stalls at epsilon_pose_bound / alpha, and the cameras know the gripper to less than a millimetre"
+        ),
     )
     bound_by_covariance: bool = parameter(
-        False, "that bound is the standard deviation of the filtered pose instead, sec. 5.4.3 (thesis: false)"
+        False,
+        "that bound is the standard deviation of the filtered pose instead, sec. 5.4.3 (thesis: false)",
+        origin=stated("sec. 5.4.3: epsilon_pose_bound is a fixed value"),
     )
     weight_fall: Number = parameter(
         0.0,
@@ -94,31 +131,53 @@ class Params:
         "sec. 5.4.3 (thesis: 0)",
         minimum=0.0,
         maximum=10.0,
+        origin=stated("sec. 5.4.3: A_pose_upd is fixed"),
     )
     epsilon_control: Metre = parameter(
-        0.0001, "error at which the Jacobian loop ends (own; thesis: 0.005)", minimum=0.0
+        0.0001,
+        "error at which the Jacobian loop ends (own; thesis: 0.005)",
+        minimum=0.0,
+        origin=assumed("as epsilon_pose_bound"),
     )
-    N_max_iter: int = parameter(20, "iterations of the Jacobian loop at most", minimum=1)
-    threshold: Metre = parameter(0.05, "error at which the arm has reached the place above the ball", minimum=0.0)
-    threshold_grasp: Metre = parameter(0.003, "error at which the gripper closes (own; thesis: 0.05)", minimum=0.0)
+    N_max_iter: int = parameter(20, "iterations of the Jacobian loop at most", minimum=1, origin=stated("appendix A"))
+    threshold: Metre = parameter(
+        0.05,
+        "error at which the arm has reached the place above the ball",
+        minimum=0.0,
+        origin=stated(
+            "appendix A, epsilon_threshold; the norm, as secs. 3.4 and 3.5 have it (algorithm 3 prints its square)"
+        ),
+    )
+    threshold_grasp: Metre = parameter(
+        0.003,
+        "error at which the gripper closes (own; thesis: 0.05)",
+        minimum=0.0,
+        origin=assumed("some times what a hand trembles"),
+    )
     settle_steps: int = parameter(
-        2, "control steps in a row below threshold_grasp before the gripper closes (own; thesis: 1)", minimum=1
+        2,
+        "control steps in a row below threshold_grasp before the gripper closes (own; thesis: 1)",
+        minimum=1,
+        origin=assumed("so that an arm that swings through the ball does not close"),
     )
     judge_apart: bool = parameter(
         True,
         "the error is that of the gripper's position, and its tilt is judged by itself (own; thesis: false)",
+        origin=assumed("a tilt that cannot be reached keeps the gripper from no ball"),
     )
     threshold_tilt: Radian = parameter(
         0.6,
         "tilt of the gripper from straight down at which it still closes, where it is judged apart (own choice)",
         minimum=0.0,
         maximum=math.pi,
+        origin=assumed("own choice: with which fingers around a ball still close on it"),
     )
     tilt_weight: Number = parameter(
         0.02,
         "weight of the tilt's error beside the position's, where they are judged apart (own choice)",
         minimum=0.001,
         maximum=1.0,
+        origin=assumed("own choice: a goal is met in position first"),
     )
     damping: Metre = parameter(
         0.02,
@@ -126,6 +185,7 @@ class Params:
         "are judged apart (own choice)",
         minimum=1e-6,
         maximum=1.0,
+        origin=assumed("own choice: some centimetres of an error that cannot be met do not let the state grow"),
     )
     shaping_time: Second = parameter(
         1.0,
@@ -133,6 +193,7 @@ class Params:
         "(own; thesis: 0)",
         minimum=0.0,
         maximum=5.0,
+        origin=assumed("the hanging arm swings once a second"),
     )
     least_response: Number = parameter(
         0.3,
@@ -140,102 +201,190 @@ class Params:
         "choice; thesis: 1)",
         minimum=0.01,
         maximum=1.0,
+        origin=assumed("an arm with slack tendons makes a tenth to a half of what it is commanded to"),
     )
     posture: Number = parameter(
         0.5,
         "part of the way to l_preferred that a control step takes where the goal leaves it open (own; thesis: 0)",
         minimum=0.0,
         maximum=1.0,
+        origin=assumed("shorter segments have taut tendons"),
     )
     l_preferred: Vector3[Metre] = parameter(
-        np.array([0.09, 0.18, 0.18]), "segment lengths that keep the tendons taut (own choice)", minimum=0.0
+        np.array([0.09, 0.18, 0.18]),
+        "segment lengths that keep the tendons taut (own choice)",
+        minimum=0.0,
+        origin=assumed("three quarters of l_calib, within eq. (11): shorter segments have taut tendons"),
     )
     windup: Metre = parameter(
         0.7,
         "largest distance of the commanded state's gripper from the measured one; 0: any (own; thesis: 0)",
         minimum=0.0,
+        origin=assumed("more than an arm sags within reach, less than a wound-up command runs ahead"),
     )
     follow_until: Number = parameter(
         0.95,
         "part of closing_time for which the arm follows the ball while the gripper closes (own; thesis: 0)",
         minimum=0.0,
         maximum=1.0,
+        origin=assumed("until the fingers are near the ball"),
     )
     threshold_reopen: Metre = parameter(
         0.04,
         "error at which a gripper that closes and follows opens again and comes from above (own choice)",
         minimum=0.0,
+        origin=assumed("own choice: a ball so far from closing fingers was moved"),
     )
     lost_after: Second = parameter(
         2.5,
         "time without ring or ball after which the arm goes back and searches; 0: it waits (own; thesis: 0)",
         minimum=0.0,
+        origin=assumed("five control periods"),
     )
-    search_steps: int = parameter(60, "control steps of going back and searching at most (own choice)", minimum=1)
+    search_steps: int = parameter(
+        60,
+        "control steps of going back and searching at most (own choice)",
+        minimum=1,
+        origin=assumed("own choice: half a minute"),
+    )
     threshold_retreat: Metre = parameter(
-        0.16, "error at which the arm, coming down, returns above the ball (own choice)", minimum=0.0
+        0.16,
+        "error at which the arm, coming down, returns above the ball (own choice)",
+        minimum=0.0,
+        origin=assumed("own choice: more than the error when the goal changes, threshold + sqrt(2) d_grasp_offset"),
     )
-    d_grasp_offset: Metre = parameter(0.05, "height of the first goal above the ball", minimum=0.0)
+    d_grasp_offset: Metre = parameter(
+        0.05, "height of the first goal above the ball", minimum=0.0, origin=stated("sec. 3.5, appendix A")
+    )
     standoff: Metre = parameter(
         0.10,
         "distance beside the ball at which a gripper that is too low goes up before it comes over the ball; 0: it goes "
         "straight to the goal (own; thesis: 0)",
         minimum=0.0,
         maximum=0.3,
+        origin=assumed("open fingers reach 5 cm from the gripper's axis, the ball 2.5 cm from its middle"),
     )
-    closing_time: Second = parameter(10.0, "time that the gripper is given to close", minimum=0.0)
-    delivers: bool = parameter(False, "carry the ball to p_WG_drop and let it fall there (own choice)")
+    closing_time: Second = parameter(
+        10.0, "time that the gripper is given to close", minimum=0.0, origin=stated("sec. 3.5, 4.1")
+    )
+    delivers: bool = parameter(
+        False,
+        "carry the ball to p_WG_drop and let it fall there (own choice)",
+        origin=derived("sec. 3.5.1: the first experiment ends with the grip; sec. 3.5.3 is helix_use_case"),
+    )
     p_WG_drop: Vector3[Metre] = parameter(
-        np.array([0.0, -0.16, -0.64]), "where the gripper lets the ball fall, in the world (own choice)"
+        np.array([0.0, -0.16, -0.64]),
+        "where the gripper lets the ball fall, in the world (own choice)",
+        origin=derived("drop_height above the bowl of helix_use_case, which sets it"),
     )
     carry_after: Second = parameter(
-        1.5, "time after closing for which the arm waits before it carries the ball away (own choice)", minimum=0.0
+        1.5,
+        "time after closing for which the arm waits before it carries the ball away (own choice)",
+        minimum=0.0,
+        origin=assumed("the hand withdraws for a second"),
     )
     threshold_drop: Metre = parameter(
-        0.015, "error at which the gripper opens above the place (own; thesis: 0.05)", minimum=0.0
+        0.015,
+        "error at which the gripper opens above the place (own; thesis: 0.05)",
+        minimum=0.0,
+        origin=assumed("by tuning: ours, and the thesis's, whose only threshold is epsilon_threshold"),
     )
-    patience: int = parameter(60, "control steps without progress before the arm gives up (own choice)", minimum=1)
+    patience: int = parameter(
+        60,
+        "control steps without progress before the arm gives up (own choice)",
+        minimum=1,
+        origin=assumed("own choice: half a minute"),
+    )
     threshold_accept: Metre = parameter(
         0.01,
         "error at which the gripper closes where it makes no more progress; 0: it gives up (own; thesis: 0)",
         minimum=0.0,
+        origin=assumed("less than the 15 mm beside the ball from which the fingers still take it"),
     )
-    progress: Metre = parameter(0.001, "change of the error that is progress (own choice)", minimum=0.0)
-    max_steps: int = parameter(1000, "control steps before the arm gives up (own choice)", minimum=1)
-    P_init: SquareMetre = parameter(2000.0, "variance of all three filters before the first measurement", minimum=0.0)
+    progress: Metre = parameter(
+        0.001,
+        "change of the error that is progress (own choice)",
+        minimum=0.0,
+        origin=assumed("own choice: what a hand trembles is no progress"),
+    )
+    max_steps: int = parameter(
+        1000,
+        "control steps before the arm gives up (own choice)",
+        minimum=1,
+        origin=assumed("own choice: far more than the scenarios' patience of 60 s lets be"),
+    )
+    P_init: SquareMetre = parameter(
+        2000.0, "variance of all three filters before the first measurement", minimum=0.0, origin=stated("appendix A")
+    )
     Q_ball: SquareMetre = parameter(
-        1e-6, "ball filter: variance that a control period adds (own; thesis: 0.1)", minimum=0.0
+        1e-6,
+        "ball filter: variance that a control period adds (own; thesis: 0.1)",
+        minimum=0.0,
+        origin=assumed("1 mm in a control period: drift of a hand"),
     )
-    R_ball: SquareMetre = parameter(0.01, "ball filter: variance of a measurement, without covariances", minimum=0.0)
+    R_ball: SquareMetre = parameter(
+        0.01, "ball filter: variance of a measurement, without covariances", minimum=0.0, origin=stated("appendix A")
+    )
     Q_wrist: SquareMetre = parameter(
-        4e-5, "wrist filter: variance that a control period adds (own; thesis: 0.01)", minimum=0.0
+        4e-5,
+        "wrist filter: variance that a control period adds (own; thesis: 0.01)",
+        minimum=0.0,
+        origin=assumed("6 mm in a control period: what J dq leaves unpredicted"),
     )
-    R_wrist: SquareMetre = parameter(0.1, "wrist filter: variance of a measurement, without covariances", minimum=0.0)
+    R_wrist: SquareMetre = parameter(
+        0.1, "wrist filter: variance of a measurement, without covariances", minimum=0.0, origin=stated("appendix A")
+    )
     Q_direction: SquareMetre = parameter(
-        4e-5, "gripper direction filter: variance a control period adds (own; thesis: 0.1)", minimum=0.0
+        4e-5,
+        "gripper direction filter: variance a control period adds (own; thesis: 0.1)",
+        minimum=0.0,
+        origin=assumed("6 mm in a control period: what J dq leaves unpredicted"),
     )
     R_direction: SquareMetre = parameter(
-        0.01, "gripper direction filter: variance of a measurement, without covariances", minimum=0.0
+        0.01,
+        "gripper direction filter: variance of a measurement, without covariances",
+        minimum=0.0,
+        origin=stated("appendix A"),
     )
     use_covariance: bool = parameter(
-        True, "take the measurements' covariances for R (own; thesis: false); then Q wants to be of their size"
+        True,
+        "take the measurements' covariances for R (own; thesis: false); then Q wants to be of their size",
+        origin=assumed("the vision knows how exact each measurement is"),
     )
     ball_motion: Metre = parameter(
         0.0006,
         "standard deviation, along an axis, of a ball's tremor, which is no motion to follow (own choice)",
         minimum=0.0,
+        origin=derived("tremor_rms / sqrt(3), of the plant's hand: as if the controller knew how a hand trembles"),
     )
-    filter_pictures: bool = parameter(True, "filter in every step, not once a control period (own; thesis: false)")
-    predict_motion: bool = parameter(True, "expect the arm to move as commanded (own; thesis: false)")
+    filter_pictures: bool = parameter(
+        True,
+        "filter in every step, not once a control period (own; thesis: false)",
+        origin=assumed("every picture counts"),
+    )
+    predict_motion: bool = parameter(
+        True,
+        "expect the arm to move as commanded (own; thesis: false)",
+        origin=assumed("an arm that is commanded moves"),
+    )
     response_time: Second = parameter(
-        0.15, "time in which most of a commanded motion comes (own choice)", minimum=0.001
+        0.15,
+        "time in which most of a commanded motion comes (own choice)",
+        minimum=0.001,
+        origin=assumed("own choice: about the lag of motors and arm"),
     )
     gate: Number = parameter(
         8.0,
         "standard deviations from what is expected beyond which a measurement is refused; 0: none (own; thesis: 0)",
         minimum=0.0,
+        origin=assumed("standard deviations; refuses fits of the ring that are centimetres off"),
     )
-    gate_steps: int = parameter(4, "measurements in a row that are refused before one is taken (own choice)", minimum=1)
+    gate_steps: int = parameter(
+        4,
+        "measurements in a row that are refused before one is taken (own choice)",
+        minimum=1,
+        origin=assumed("own choice: as many pictures in a row, 0.4 s"),
+    )
 
     def check(self) -> None:
         """Raise InvalidServoParameters, with all faults, if the servo cannot work with these values."""

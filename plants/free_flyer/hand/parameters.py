@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from handover.cosim.blocks.block import InvalidParameters
+from handover.cosim.blocks.origins import assumed, derived, stated
 from handover.cosim.blocks.plain_rotation import column, normalize, quaternion, rotation_matrix
 from handover.cosim.blocks.ports import Vector3, Vector4, parameter
 from handover.cosim.blocks.units import (
@@ -76,70 +77,186 @@ class StartHolder(enum.IntEnum):
 class PersonParams:
     """What the person does, with what arm, and the object: [Fernandes2020] sec. 4.1.2, its sides in metres."""
 
-    motion: Motion = parameter(Motion.TAKE, "what the person does at the robot's first signal")
-    motion_again: Motion = parameter(Motion.GIVE, "what the person does at each later signal")
-    object_with: StartHolder = parameter(StartHolder.FREE, "who has the object at the start")
-    p_WO_0: Vector3[Metre] = parameter(np.array([-0.10, -0.57, 0.0]), "where a free object is at the start")
-    q_WO_0: Vector4[Number] = parameter(np.array([1.0, 0.0, 0.0, 0.0]), "orientation of a free object at the start")
-    p_WH_0: Vector3[Metre] = parameter(np.array([-0.40, 0.10, -0.05]), "where the hand rests")
-    q_WH_0: Vector4[Number] = parameter(np.array([1.0, 0.0, 0.0, 0.0]), "orientation of the hand where it rests")
-    arm_reach: Metre = parameter(0.90, "how far from its rest the hand goes", minimum=0.05, maximum=5.0)
-
-    object_mass: Kilogram = parameter(0.1, "mass of the object", minimum=0.001, maximum=100.0)
-    object_size: Vector3[Metre] = parameter(
-        np.array([0.021, 0.195, 0.017]), "sides of the object, a box", minimum=0.001, maximum=1.0
+    motion: Motion = parameter(
+        Motion.TAKE, "what the person does at the robot's first signal", origin=stated("sec. 5.5")
     )
-    p_OG: Vector3[Metre] = parameter(np.array([0.0, -0.07, 0.0]), "where the person offers the object to the gripper")
-    p_OH: Vector3[Metre] = parameter(np.array([0.0, 0.07, 0.0]), "where the hand takes hold of the object")
+    motion_again: Motion = parameter(
+        Motion.GIVE, "what the person does at each later signal", origin=stated("sec. 5.5, T3")
+    )
+    object_with: StartHolder = parameter(
+        StartHolder.FREE, "who has the object at the start", origin=stated("sec. 4.3.1")
+    )
+    p_WO_0: Vector3[Metre] = parameter(
+        np.array([-0.10, -0.57, 0.0]), "where a free object is at the start", origin=assumed("not given")
+    )
+    q_WO_0: Vector4[Number] = parameter(
+        np.array([1.0, 0.0, 0.0, 0.0]), "orientation of a free object at the start", origin=assumed("not given")
+    )
+    p_WH_0: Vector3[Metre] = parameter(
+        np.array([-0.40, 0.10, -0.05]), "where the hand rests", origin=assumed("not given")
+    )
+    q_WH_0: Vector4[Number] = parameter(
+        np.array([1.0, 0.0, 0.0, 0.0]), "orientation of the hand where it rests", origin=assumed("not given")
+    )
+    arm_reach: Metre = parameter(
+        0.90, "how far from its rest the hand goes", minimum=0.05, maximum=5.0, origin=assumed("not given")
+    )
 
-    reaction_time: Second = parameter(0.35, "mean time from seeing to acting", minimum=0.0, maximum=10.0)
-    reaction_spread: Number = parameter(0.15, "its deviation, relative", minimum=0.0, maximum=0.3)
-    reach_speed: MetrePerSecond = parameter(0.40, "highest speed of a reach", minimum=0.01, maximum=3.0)
-    grasp_time: Second = parameter(0.40, "how long the fingers close or open", minimum=0.01, maximum=10.0)
-    pull_direction: Vector3[Number] = parameter(np.array([-0.25, 0.0, 1.0]), "direction of a pull, in the world")
-    pull_speed: MetrePerSecond = parameter(0.35, "speed of a pull that nothing resists", minimum=0.001, maximum=3.0)
-    pull_ramp: Second = parameter(0.30, "how long its effort takes to rise", minimum=0.01, maximum=10.0)
-    pull_distance: Metre = parameter(0.30, "longest pull", minimum=0.0, maximum=2.0)
-    push_speed: MetrePerSecond = parameter(0.15, "speed of a push that nothing resists", minimum=0.001, maximum=3.0)
-    push_ramp: Second = parameter(0.30, "how long its effort takes to rise", minimum=0.01, maximum=10.0)
-    push_distance: Metre = parameter(0.30, "longest push, including the gap to the palm", minimum=0.0, maximum=2.0)
-    effort: Newton = parameter(2.0, "force of a pull at rest", minimum=0.05, maximum=100.0)
-    push_share: Number = parameter(0.5, "force of a push, relative to a pull's", minimum=0.05, maximum=2.0)
-    arm_mass: Kilogram = parameter(1.0, "mass of the arm, as the hand feels it", minimum=0.05, maximum=50.0)
-    offer_gap: Metre = parameter(0.04, "how far before the palm a push begins", minimum=0.0, maximum=0.5)
-    patience: Second = parameter(10.0, "how long the person pulls or pushes in vain", minimum=0.1, maximum=1e4)
+    object_mass: Kilogram = parameter(
+        0.1, "mass of the object", minimum=0.001, maximum=100.0, origin=stated("sec. 4.1.2")
+    )
+    object_size: Vector3[Metre] = parameter(
+        np.array([0.021, 0.195, 0.017]),
+        "sides of the object, a box",
+        minimum=0.001,
+        maximum=1.0,
+        origin=derived("sec. 4.1.2 prints mm; they are metres"),
+    )
+    p_OG: Vector3[Metre] = parameter(
+        np.array([0.0, -0.07, 0.0]),
+        "where the person offers the object to the gripper",
+        origin=derived("as handover_place.p_OG"),
+    )
+    p_OH: Vector3[Metre] = parameter(
+        np.array([0.0, 0.07, 0.0]),
+        "where the hand takes hold of the object",
+        origin=derived("sec. 3.1.1: the other end of the object"),
+    )
 
-    arm_stiffness: NewtonPerMetre = parameter(120.0, "stiffness of the arm", minimum=1.0, maximum=5000.0)
-    arm_damping: NewtonSecondPerMetre = parameter(12.0, "damping of the arm", minimum=0.0, maximum=200.0)
-    arm_force_max: Newton = parameter(3.0, "force at which the arm yields", minimum=0.1, maximum=200.0)
-    wrist_stiffness: NewtonMetrePerRadian = parameter(2.5, "stiffness of the wrist", minimum=0.01, maximum=200.0)
-    wrist_damping: NewtonMetreSecondPerRadian = parameter(0.20, "damping of the wrist", minimum=0.0, maximum=10.0)
-    wrist_torque_max: NewtonMetre = parameter(0.6, "torque at which the wrist yields", minimum=0.01, maximum=50.0)
-    recovery_time: Second = parameter(1.0, "how long an arm takes to recover from yielding", minimum=0.05, maximum=1e6)
-    fist_radius: Metre = parameter(0.035, "radius of a fist", minimum=0.005, maximum=0.2)
-    fist_offset: Metre = parameter(-0.07, "where along y of G a fist pushes", minimum=-0.3, maximum=0.3)
+    reaction_time: Second = parameter(
+        0.35, "mean time from seeing to acting", minimum=0.0, maximum=10.0, origin=assumed("not given")
+    )
+    reaction_spread: Number = parameter(
+        0.15, "its deviation, relative", minimum=0.0, maximum=0.3, origin=assumed("not given")
+    )
+    reach_speed: MetrePerSecond = parameter(
+        0.40, "highest speed of a reach", minimum=0.01, maximum=3.0, origin=assumed("not given")
+    )
+    grasp_time: Second = parameter(
+        0.40, "how long the fingers close or open", minimum=0.01, maximum=10.0, origin=assumed("not given")
+    )
+    pull_direction: Vector3[Number] = parameter(
+        np.array([-0.25, 0.0, 1.0]),
+        "direction of a pull, in the world",
+        origin=assumed("sec. 4.3.1: the gripper is moved mostly along z; how far along x is not given"),
+    )
+    pull_speed: MetrePerSecond = parameter(
+        0.35,
+        "speed of a pull that nothing resists",
+        minimum=0.001,
+        maximum=3.0,
+        origin=assumed("not given: that of a hand which nothing resists"),
+    )
+    pull_ramp: Second = parameter(
+        0.30, "how long its effort takes to rise", minimum=0.01, maximum=10.0, origin=assumed("not given")
+    )
+    pull_distance: Metre = parameter(0.30, "longest pull", minimum=0.0, maximum=2.0, origin=assumed("not given"))
+    push_speed: MetrePerSecond = parameter(
+        0.15,
+        "speed of a push that nothing resists",
+        minimum=0.001,
+        maximum=3.0,
+        origin=assumed("not given: that of a hand which nothing resists"),
+    )
+    push_ramp: Second = parameter(
+        0.30, "how long its effort takes to rise", minimum=0.01, maximum=10.0, origin=assumed("not given")
+    )
+    push_distance: Metre = parameter(
+        0.30, "longest push, including the gap to the palm", minimum=0.0, maximum=2.0, origin=assumed("not given")
+    )
+    effort: Newton = parameter(
+        2.0,
+        "force of a pull at rest",
+        minimum=0.05,
+        maximum=100.0,
+        origin=assumed("not given; the scenario's is its parameter strength"),
+    )
+    push_share: Number = parameter(
+        0.5,
+        "force of a push, relative to a pull's",
+        minimum=0.05,
+        maximum=2.0,
+        origin=assumed("not given: more tilts the object in the hand"),
+    )
+    arm_mass: Kilogram = parameter(
+        1.0, "mass of the arm, as the hand feels it", minimum=0.05, maximum=50.0, origin=assumed("not given")
+    )
+    offer_gap: Metre = parameter(
+        0.04, "how far before the palm a push begins", minimum=0.0, maximum=0.5, origin=assumed("not given")
+    )
+    patience: Second = parameter(
+        10.0, "how long the person pulls or pushes in vain", minimum=0.1, maximum=1e4, origin=assumed("not given")
+    )
+
+    arm_stiffness: NewtonPerMetre = parameter(
+        120.0, "stiffness of the arm", minimum=1.0, maximum=5000.0, origin=assumed("not given")
+    )
+    arm_damping: NewtonSecondPerMetre = parameter(
+        12.0, "damping of the arm", minimum=0.0, maximum=200.0, origin=assumed("not given")
+    )
+    arm_force_max: Newton = parameter(
+        3.0, "force at which the arm yields", minimum=0.1, maximum=200.0, origin=assumed("not given")
+    )
+    wrist_stiffness: NewtonMetrePerRadian = parameter(
+        2.5, "stiffness of the wrist", minimum=0.01, maximum=200.0, origin=assumed("not given")
+    )
+    wrist_damping: NewtonMetreSecondPerRadian = parameter(
+        0.20, "damping of the wrist", minimum=0.0, maximum=10.0, origin=assumed("not given")
+    )
+    wrist_torque_max: NewtonMetre = parameter(
+        0.6, "torque at which the wrist yields", minimum=0.01, maximum=50.0, origin=assumed("not given")
+    )
+    recovery_time: Second = parameter(
+        1.0, "how long an arm takes to recover from yielding", minimum=0.05, maximum=1e6, origin=assumed("not given")
+    )
+    fist_radius: Metre = parameter(0.035, "radius of a fist", minimum=0.005, maximum=0.2, origin=assumed("not given"))
+    fist_offset: Metre = parameter(
+        -0.07, "where along y of G a fist pushes", minimum=-0.3, maximum=0.3, origin=assumed("not given")
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
 class TrackParams(PersonParams):
     """What may lead a hand in place of that person, and how it follows."""
 
-    driven_by: Driver = parameter(Driver.PERSON, "who moves the hand: a simulated person, a file, or the inputs")
-    track: str = parameter("", "CSV file of a recorded track of a hand, of driven_by TRACK")
+    driven_by: Driver = parameter(
+        Driver.PERSON, "who moves the hand: a simulated person, a file, or the inputs", origin=assumed("not given")
+    )
+    track: str = parameter(
+        "", "CSV file of a recorded track of a hand, of driven_by TRACK", origin=assumed("not given")
+    )
     age_max: Second = parameter(
-        0.2, "age from which tracking counts as lost; longest gap of a track", minimum=0.001, maximum=10.0
+        0.2,
+        "age from which tracking counts as lost; longest gap of a track",
+        minimum=0.001,
+        maximum=10.0,
+        origin=assumed("not given"),
     )
     hand_bandwidth: PerSecond = parameter(
-        20.0, "how fast a hand follows its track: it lags by the inverse", minimum=0.5, maximum=100.0
+        20.0,
+        "how fast a hand follows its track: it lags by the inverse",
+        minimum=0.5,
+        maximum=100.0,
+        origin=assumed("sec. 4.2.3: the simulated hand follows in less than 0.1 s; here in 0.05 s"),
     )
-    hand_speed_max: MetrePerSecond = parameter(2.0, "speed at which it follows", minimum=0.01, maximum=10.0)
-    hand_acceleration_max: MetrePerSecond2 = parameter(20.0, "its acceleration", minimum=0.1, maximum=200.0)
-    hand_turning_max: RadianPerSecond = parameter(8.0, "its angular velocity", minimum=0.1, maximum=50.0)
+    hand_speed_max: MetrePerSecond = parameter(
+        2.0, "speed at which it follows", minimum=0.01, maximum=10.0, origin=assumed("not given")
+    )
+    hand_acceleration_max: MetrePerSecond2 = parameter(
+        20.0, "its acceleration", minimum=0.1, maximum=200.0, origin=assumed("not given")
+    )
+    hand_turning_max: RadianPerSecond = parameter(
+        8.0, "its angular velocity", minimum=0.1, maximum=50.0, origin=assumed("not given")
+    )
     hand_turning_acceleration_max: RadianPerSecond2 = parameter(
-        80.0, "its angular acceleration", minimum=1.0, maximum=1000.0
+        80.0, "its angular acceleration", minimum=1.0, maximum=1000.0, origin=assumed("not given")
     )
     finger_force: Newton = parameter(
-        0.1, "force of a phalanx whose joint wants on, if the hand follows a track", minimum=0.0, maximum=20.0
+        0.1,
+        "force of a phalanx whose joint wants on, if the hand follows a track",
+        minimum=0.0,
+        maximum=20.0,
+        origin=assumed("not given"),
     )
 
 
@@ -147,64 +264,169 @@ class TrackParams(PersonParams):
 class ContactParams(PersonParams):
     """Fingers, the gripper's hold, and a person's errors and tremor: all that does not depend on who leads a hand."""
 
-    finger_rate: RadianPerSecond = parameter(12.0, "speed of the hand's joints", minimum=0.1, maximum=100.0)
-    finger_stiffness: NewtonPerMetre = parameter(300.0, "stiffness of a phalanx", minimum=1.0, maximum=1e5)
-    finger_damping: NewtonSecondPerMetre = parameter(3.0, "damping of a phalanx", minimum=0.0, maximum=1000.0)
+    finger_rate: RadianPerSecond = parameter(
+        12.0, "speed of the hand's joints", minimum=0.1, maximum=100.0, origin=assumed("not given")
+    )
+    finger_stiffness: NewtonPerMetre = parameter(
+        300.0, "stiffness of a phalanx", minimum=1.0, maximum=1e5, origin=assumed("not given")
+    )
+    finger_damping: NewtonSecondPerMetre = parameter(
+        3.0, "damping of a phalanx", minimum=0.0, maximum=1000.0, origin=assumed("not given")
+    )
 
-    grip_stiffness: NewtonPerMetre = parameter(800.0, "stiffness of the grip", minimum=1.0, maximum=1e5)
-    grip_damping: NewtonSecondPerMetre = parameter(8.0, "damping of the grip", minimum=0.0, maximum=1000.0)
-    grip_force_max: Newton = parameter(5.0, "force at which the object slides", minimum=0.01, maximum=1000.0)
-    grip_turn_stiffness: NewtonMetrePerRadian = parameter(4.0, "its turning stiffness", minimum=0.01, maximum=1e4)
-    grip_turn_damping: NewtonMetreSecondPerRadian = parameter(0.04, "its turning damping", minimum=0.0, maximum=100.0)
-    grip_torque_max: NewtonMetre = parameter(0.4, "torque at which it turns in the grip", minimum=0.001, maximum=100.0)
-    centring_time: Second = parameter(0.5, "how long the grip takes to centre", minimum=0.01, maximum=100.0)
-    palm_stiffness: NewtonPerMetre = parameter(600.0, "stiffness of the palm", minimum=1.0, maximum=1e5)
-    palm_damping: NewtonSecondPerMetre = parameter(6.0, "damping of the palm", minimum=0.0, maximum=1000.0)
-    palm_depth: Metre = parameter(0.03, "how far the palm lies behind G", minimum=0.001, maximum=0.5)
-    palm_width: Metre = parameter(0.04, "half the width of the palm", minimum=0.001, maximum=0.5)
-    capture_axial: Metre = parameter(0.03, "how far along x of G the fingers reach", minimum=0.001, maximum=0.2)
-    capture_lateral: Metre = parameter(0.02, "how far along z of G they reach", minimum=0.001, maximum=0.2)
-    capture_end: Metre = parameter(0.01, "how far beyond an object's end G may be", minimum=0.0, maximum=0.1)
-    angle_open: Radian = parameter(1.20, "angle of the open gripper", minimum=0.0, maximum=3.0)
-    angle_empty: Radian = parameter(0.60, "angle of the gripper closed on nothing", minimum=0.0, maximum=3.0)
-    angle_0: Radian = parameter(1.20, "angle of the gripper at the start", minimum=0.0, maximum=3.0)
-    aperture: Metre = parameter(0.055, "thickness that the open gripper just takes", minimum=0.001, maximum=0.5)
+    grip_stiffness: NewtonPerMetre = parameter(
+        800.0, "stiffness of the grip", minimum=1.0, maximum=1e5, origin=assumed("not given")
+    )
+    grip_damping: NewtonSecondPerMetre = parameter(
+        8.0, "damping of the grip", minimum=0.0, maximum=1000.0, origin=assumed("not given")
+    )
+    grip_force_max: Newton = parameter(
+        5.0, "force at which the object slides", minimum=0.01, maximum=1000.0, origin=assumed("not given")
+    )
+    grip_turn_stiffness: NewtonMetrePerRadian = parameter(
+        4.0, "its turning stiffness", minimum=0.01, maximum=1e4, origin=assumed("not given")
+    )
+    grip_turn_damping: NewtonMetreSecondPerRadian = parameter(
+        0.04, "its turning damping", minimum=0.0, maximum=100.0, origin=assumed("not given")
+    )
+    grip_torque_max: NewtonMetre = parameter(
+        0.4, "torque at which it turns in the grip", minimum=0.001, maximum=100.0, origin=assumed("not given")
+    )
+    centring_time: Second = parameter(
+        0.5, "how long the grip takes to centre", minimum=0.01, maximum=100.0, origin=assumed("not given")
+    )
+    palm_stiffness: NewtonPerMetre = parameter(
+        600.0, "stiffness of the palm", minimum=1.0, maximum=1e5, origin=assumed("not given")
+    )
+    palm_damping: NewtonSecondPerMetre = parameter(
+        6.0, "damping of the palm", minimum=0.0, maximum=1000.0, origin=assumed("not given")
+    )
+    palm_depth: Metre = parameter(
+        0.03, "how far the palm lies behind G", minimum=0.001, maximum=0.5, origin=assumed("not given")
+    )
+    palm_width: Metre = parameter(
+        0.04, "half the width of the palm", minimum=0.001, maximum=0.5, origin=assumed("not given")
+    )
+    capture_axial: Metre = parameter(
+        0.03, "how far along x of G the fingers reach", minimum=0.001, maximum=0.2, origin=assumed("not given")
+    )
+    capture_lateral: Metre = parameter(
+        0.02, "how far along z of G they reach", minimum=0.001, maximum=0.2, origin=assumed("not given")
+    )
+    capture_end: Metre = parameter(
+        0.01, "how far beyond an object's end G may be", minimum=0.0, maximum=0.1, origin=assumed("not given")
+    )
+    angle_open: Radian = parameter(
+        1.20, "angle of the open gripper", minimum=0.0, maximum=3.0, origin=assumed("above beta, sec. 4.1.2")
+    )
+    angle_empty: Radian = parameter(
+        0.60,
+        "angle of the gripper closed on nothing",
+        minimum=0.0,
+        maximum=3.0,
+        origin=assumed("below beta, sec. 4.1.2"),
+    )
+    angle_0: Radian = parameter(
+        1.20,
+        "angle of the gripper at the start",
+        minimum=0.0,
+        maximum=3.0,
+        origin=assumed("open, for trying the unit; the handovers begin with handover_place.angle_0"),
+    )
+    aperture: Metre = parameter(
+        0.055, "thickness that the open gripper just takes", minimum=0.001, maximum=0.5, origin=assumed("not given")
+    )
     release_angle: Radian = parameter(
-        0.20, "how far the fingers open before the object comes free", minimum=0.0, maximum=3.0
+        0.20,
+        "how far the fingers open before the object comes free",
+        minimum=0.0,
+        maximum=3.0,
+        origin=assumed("not given"),
     )
-    grip_fades: bool = parameter(False, "until then the force and torque that it holds fall, with how far they open")
-    gripper_rate: RadianPerSecond = parameter(0.6, "speed of the gripper's angle", minimum=0.01, maximum=100.0)
+    grip_fades: bool = parameter(
+        False,
+        "until then the force and torque that it holds fall, with how far they open",
+        origin=assumed("not given: the grip is as firm as ever until it lets go"),
+    )
+    gripper_rate: RadianPerSecond = parameter(
+        0.6, "speed of the gripper's angle", minimum=0.01, maximum=100.0, origin=assumed("not given")
+    )
 
-    line_of_sight: Vector3[Number] = parameter(np.array([1.0, 0.0, 0.0]), "where the person looks, in the world")
+    line_of_sight: Vector3[Number] = parameter(
+        np.array([1.0, 0.0, 0.0]),
+        "where the person looks, in the world",
+        origin=derived("sec. 5.7: the participants look at a screen before them, towards the robot"),
+    )
     sight_error: Metre = parameter(
-        0.002, "deviation of where things are seen, along each axis across the line of sight", minimum=0.0, maximum=1.0
+        0.002,
+        "deviation of where things are seen, along each axis across the line of sight",
+        minimum=0.0,
+        maximum=1.0,
+        origin=assumed("not given: of a skilled person"),
     )
-    depth_error: Metre = parameter(0.006, "the same along the line of sight", minimum=0.0, maximum=1.0)
-    interface_delay: Second = parameter(0.05, "how old is what the person sees", minimum=0.0, maximum=5.0)
+    depth_error: Metre = parameter(
+        0.006,
+        "the same along the line of sight",
+        minimum=0.0,
+        maximum=1.0,
+        origin=assumed("not given: of a skilled person; a screen shows depth worst"),
+    )
+    interface_delay: Second = parameter(
+        0.05, "how old is what the person sees", minimum=0.0, maximum=5.0, origin=assumed("sec. 4.2.3: less than 0.1 s")
+    )
     timing_error: Second = parameter(
-        0.05, "deviation of how early fingers are taken for closed or opened", minimum=0.0, maximum=5.0
+        0.05,
+        "deviation of how early fingers are taken for closed or opened",
+        minimum=0.0,
+        maximum=5.0,
+        origin=assumed("not given: of a skilled person"),
     )
-    effort_spread: Number = parameter(0.05, "deviation of the effort, relative", minimum=0.0, maximum=0.5)
+    effort_spread: Number = parameter(
+        0.05, "deviation of the effort, relative", minimum=0.0, maximum=0.5, origin=assumed("not given")
+    )
     haste: Number = parameter(
-        0.0, "share of attempts in which the person does not wait for the gripper", minimum=0.0, maximum=1.0
+        0.0,
+        "share of attempts in which the person does not wait for the gripper",
+        minimum=0.0,
+        maximum=1.0,
+        origin=assumed("not given: of a skilled person"),
     )
     finger_reach: Metre = parameter(
         0.04,
         "how far from the object's middle line the hand may be for its fingers to get it",
         minimum=0.001,
         maximum=0.2,
+        origin=assumed("not given: half a finger's length"),
     )
     palm_back: Metre = parameter(
-        0.03, "how far the palm of the hand lies behind its middle", minimum=0.001, maximum=0.2
+        0.03,
+        "how far the palm of the hand lies behind its middle",
+        minimum=0.001,
+        maximum=0.2,
+        origin=assumed("not given"),
     )
-    attempts: int = parameter(3, "how often the person tries at a signal", minimum=1, maximum=100)
+    attempts: int = parameter(
+        3, "how often the person tries at a signal", minimum=1, maximum=100, origin=assumed("not given")
+    )
 
-    tremor_rms: Metre = parameter(0.0005, "root mean square length of the tremor", minimum=0.0, maximum=0.05)
-    tremor_frequency: Hertz = parameter(8.0, "middle of the tremor's band", minimum=0.1, maximum=50.0)
-    tremor_bandwidth: Hertz = parameter(2.0, "width of the tremor's band at half power", minimum=0.01, maximum=50.0)
-    drift_rms: Metre = parameter(0.002, "root mean square length of the drift", minimum=0.0, maximum=0.1)
-    drift_time: Second = parameter(5.0, "correlation time of the drift", minimum=0.1, maximum=1000.0)
-    substep: Second = parameter(0.016, "longest step of the integration", minimum=1e-5, maximum=0.1)
+    tremor_rms: Metre = parameter(
+        0.0005, "root mean square length of the tremor", minimum=0.0, maximum=0.05, origin=assumed("not given")
+    )
+    tremor_frequency: Hertz = parameter(
+        8.0, "middle of the tremor's band", minimum=0.1, maximum=50.0, origin=assumed("not given")
+    )
+    tremor_bandwidth: Hertz = parameter(
+        2.0, "width of the tremor's band at half power", minimum=0.01, maximum=50.0, origin=assumed("not given")
+    )
+    drift_rms: Metre = parameter(
+        0.002, "root mean square length of the drift", minimum=0.0, maximum=0.1, origin=assumed("not given")
+    )
+    drift_time: Second = parameter(
+        5.0, "correlation time of the drift", minimum=0.1, maximum=1000.0, origin=assumed("not given")
+    )
+    substep: Second = parameter(
+        0.016, "longest step of the integration", minimum=1e-5, maximum=0.1, origin=assumed("numerical")
+    )
     seed: int = parameter(0, "seed of the random numbers", minimum=0)
 
     @property

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from handover.cosim.blocks.block import InvalidParameters
+from handover.cosim.blocks.origins import assumed, derived
 from handover.cosim.blocks.plain_rotation import (
     Vector,
     add,
@@ -50,36 +51,108 @@ class Params(ContactParams):
     spring k needs more than k times the step.
     """
 
-    p_WO_0: Vector3[Metre] = parameter(np.array([0.10, -0.80, 0.0]), "where a free object is at the start")
-    p_WH_0: Vector3[Metre] = parameter(np.array([-0.65, 0.0, -0.05]), "where the middle between the hands rests")
-    object_mass: Kilogram = parameter(3.0, "mass of the object", minimum=0.001, maximum=100.0)
+    p_WO_0: Vector3[Metre] = parameter(
+        np.array([0.10, -0.80, 0.0]),
+        "where a free object is at the start",
+        origin=assumed("sec. 6.3 proposes two robots with a larger object, and gives no values"),
+    )
+    p_WH_0: Vector3[Metre] = parameter(
+        np.array([-0.65, 0.0, -0.05]),
+        "where the middle between the hands rests",
+        origin=assumed("sec. 6.3 proposes two robots with a larger object, and gives no values"),
+    )
+    object_mass: Kilogram = parameter(
+        3.0,
+        "mass of the object",
+        minimum=0.001,
+        maximum=100.0,
+        origin=assumed("sec. 6.3 proposes two robots with a larger object, and gives no values"),
+    )
     object_size: Vector3[Metre] = parameter(
-        np.array([0.40, 0.70, 0.05]), "sides of the object, a box, without its handles", minimum=0.001, maximum=2.0
+        np.array([0.40, 0.70, 0.05]),
+        "sides of the object, a box, without its handles",
+        minimum=0.001,
+        maximum=2.0,
+        origin=assumed("sec. 6.3 proposes two robots with a larger object, and gives no values"),
     )
     p_OG: Vector3[Metre] = parameter(
-        np.array([0.28, 0.0, 0.0]), "middle between the handles for the grippers", minimum=-2.0, maximum=2.0
+        np.array([0.28, 0.0, 0.0]),
+        "middle between the handles for the grippers",
+        minimum=-2.0,
+        maximum=2.0,
+        origin=assumed("sec. 6.3 proposes two robots with a larger object, and gives no values"),
     )
     p_OH: Vector3[Metre] = parameter(
-        np.array([-0.28, 0.0, 0.0]), "middle between the hands' handles, or the one hand's", minimum=-2.0, maximum=2.0
+        np.array([-0.28, 0.0, 0.0]),
+        "middle between the hands' handles, or the one hand's",
+        minimum=-2.0,
+        maximum=2.0,
+        origin=assumed("sec. 6.3 proposes two robots with a larger object, and gives no values"),
     )
-    pull_direction: Vector3[Number] = parameter(np.array([-1.0, 0.0, 0.0]), "direction of a pull, in the world")
-    effort: Newton = parameter(2.0, "force of each hand's pull at rest", minimum=0.05, maximum=100.0)
-    fist_offset: Metre = parameter(0.0, "where along y of G fists push", minimum=-0.3, maximum=0.3)
-    grip_damping: NewtonSecondPerMetre = parameter(40.0, "damping of the grip", minimum=0.0, maximum=1000.0)
-    grip_turn_damping: NewtonMetreSecondPerRadian = parameter(0.3, "its turning damping", minimum=0.0, maximum=100.0)
-    palm_damping: NewtonSecondPerMetre = parameter(20.0, "damping of the palm", minimum=0.0, maximum=1000.0)
+    pull_direction: Vector3[Number] = parameter(
+        np.array([-1.0, 0.0, 0.0]),
+        "direction of a pull, in the world",
+        origin=assumed("sec. 6.3: away from both robots, which hold the object side by side"),
+    )
+    effort: Newton = parameter(
+        2.0,
+        "force of each hand's pull at rest",
+        minimum=0.05,
+        maximum=100.0,
+        origin=assumed("not given; the scenario's is its parameter strength"),
+    )
+    fist_offset: Metre = parameter(
+        0.0,
+        "where along y of G fists push",
+        minimum=-0.3,
+        maximum=0.3,
+        origin=assumed("fists push in the middle of the palms"),
+    )
+    grip_damping: NewtonSecondPerMetre = parameter(
+        40.0,
+        "damping of the grip",
+        minimum=0.0,
+        maximum=1000.0,
+        origin=assumed(
+            "between two robots coupled at 16 ms a grip needs more than person.grip_damping, or its energy rises"
+        ),
+    )
+    grip_turn_damping: NewtonMetreSecondPerRadian = parameter(
+        0.3, "its turning damping", minimum=0.0, maximum=100.0, origin=assumed("as grip_damping")
+    )
+    palm_damping: NewtonSecondPerMetre = parameter(
+        20.0, "damping of the palm", minimum=0.0, maximum=1000.0, origin=assumed("as grip_damping")
+    )
     handle_size: Vector3[Metre] = parameter(
-        np.array([0.021, 0.12, 0.017]), "sides of each handle, whose mass is the object's", minimum=0.001, maximum=1.0
+        np.array([0.021, 0.12, 0.017]),
+        "sides of each handle, whose mass is the object's",
+        minimum=0.001,
+        maximum=1.0,
+        origin=assumed("the section of person.object_size, which gripper and hand are made for"),
     )
     grip_spacing: Metre = parameter(
-        0.50, "between the grippers' handles, along y; the first is at +y", minimum=0.0, maximum=2.0
+        0.50,
+        "between the grippers' handles, along y; the first is at +y",
+        minimum=0.0,
+        maximum=2.0,
+        origin=assumed("sec. 6.3 proposes two robots with a larger object, and gives no values"),
     )
-    hands: int = parameter(2, "how many hands the person uses", minimum=1, maximum=2)
+    hands: int = parameter(
+        2, "how many hands the person uses", minimum=1, maximum=2, origin=derived("sec. 6.3: both hands")
+    )
     hand_spacing: Metre = parameter(
-        0.50, "between the hands' handles, along y; the first is at +y", minimum=0.0, maximum=2.0
+        0.50,
+        "between the hands' handles, along y; the first is at +y",
+        minimum=0.0,
+        maximum=2.0,
+        origin=assumed("sec. 6.3: both hands; about the width of shoulders"),
     )
     hand_delay: Second = parameter(
-        0.0, "how much later than the first the second hand closes and opens", minimum=0.0, maximum=10.0
+        0.0,
+        "how much later than the first the second hand closes and opens",
+        minimum=0.0,
+        maximum=10.0,
+        origin=assumed("sec. 6.3 proposes two robots with a larger object, and gives no values"),
     )
 
     @property

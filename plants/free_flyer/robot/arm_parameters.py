@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from handover.cosim.blocks.origins import assumed, derived, stated
 from handover.cosim.blocks.ports import Floats, Matrix3, Vector3, parameter
 from handover.cosim.blocks.units import (
     Kilogram,
@@ -30,40 +31,94 @@ class ArmParameters:
     Its second link is the distal one with the gripper. Without joints the arm is a part of the one rigid body.
     """
 
-    joints: int = parameter(0, "number of the arm's joints; 0: the arm is fixed", minimum=0, maximum=3)
+    joints: int = parameter(
+        0,
+        "number of the arm's joints; 0: the arm is fixed",
+        minimum=0,
+        maximum=3,
+        origin=stated("eq. (4.1): the joints are fixed"),
+    )
     axis_J: Matrix3[Number] = parameter(
         np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]),
         "axes of the joints, a row each, in B with all angles zero, of any length",
+        origin=derived(
+            "Astrobee's description of its perching arm: stretched out, the proximal joint tilts, the "
+            "distal one pans; a third joint is assumed"
+        ),
     )
     link: Matrix3[Metre] = parameter(
         np.array([[-0.10, 0.0, 0.0], [-0.08, 0.0, 0.0], [-0.04, 0.0, 0.0]]),
         "links, a row each, from a joint to the next or to the gripper, in B with all angles zero",
+        origin=assumed(
+            "Astrobee's description of its perching arm: the proximal link; from the distal joint to "
+            "where the fingers hold, and a third link, assumed"
+        ),
     )
     centre_L: Vector3[Number] = parameter(
-        np.full(3, 0.5), "where along its link a link's centre of mass is, as a share"
+        np.full(3, 0.5),
+        "where along its link a link's centre of mass is, as a share",
+        origin=assumed("not given: the middles of the links"),
     )
-    mass_L: Vector3[Kilogram] = parameter(np.array([0.1623, 0.2178, 0.1145]), "masses of the links")
+    mass_L: Vector3[Kilogram] = parameter(
+        np.array([0.1623, 0.2178, 0.1145]),
+        "masses of the links",
+        origin=derived(
+            "Astrobee's description of its perching arm: the proximal link, the distal one with the "
+            "fingers, and the fingers alone for a third"
+        ),
+    )
     I_L: Matrix3[KilogramMetre2] = parameter(
         np.array([[0.02705] * 3, [0.013525] * 3, [0.01082] * 3]),
         "principal moments of the links about their centres of mass, a row each, along the axes of B with angles zero",
+        origin=derived("Astrobee's description of its perching arm: its links' moments of inertia, the fingers' added"),
     )
     rotor_J: Vector3[KilogramMetre2] = parameter(
-        np.zeros(3), "inertia of the drives' rotors about the joints, behind their gears", minimum=0.0, maximum=10.0
+        np.zeros(3),
+        "inertia of the drives' rotors about the joints, behind their gears",
+        minimum=0.0,
+        maximum=10.0,
+        origin=assumed("not given: the links' moments in Astrobee's description are large enough to have them"),
     )
-    q_J_0: Vector3[Radian] = parameter(np.zeros(3), "angles of the joints at the start, and goals of their drives")
-    lower_J: Vector3[Radian] = parameter(np.array([-2.0944, -1.5708, -1.5708]), "lower end stops of the joints")
-    upper_J: Vector3[Radian] = parameter(np.array([1.5708, 1.5708, 1.5708]), "upper end stops of the joints")
+    q_J_0: Vector3[Radian] = parameter(
+        np.zeros(3),
+        "angles of the joints at the start, and goals of their drives",
+        origin=assumed("not given: Astrobee's arm stretched out"),
+    )
+    lower_J: Vector3[Radian] = parameter(
+        np.array([-2.0944, -1.5708, -1.5708]),
+        "lower end stops of the joints",
+        origin=derived("Astrobee's description of its perching arm; a third joint as the second"),
+    )
+    upper_J: Vector3[Radian] = parameter(
+        np.array([1.5708, 1.5708, 1.5708]),
+        "upper end stops of the joints",
+        origin=derived("Astrobee's description of its perching arm; a third joint as the second"),
+    )
     tolerance_J: Radian = parameter(
-        10.0, "how far from their goals the drives let the joints go; 0 fixes them, as in the thesis", maximum=10.0
+        10.0,
+        "how far from their goals the drives let the joints go; 0 fixes them, as in the thesis",
+        maximum=10.0,
+        origin=assumed(
+            'sec. 4.1.2: "considerably small" in the thesis, which fixed the joints; here they are free '
+            "if they move at all"
+        ),
     )
     torque_max_J: Vector3[NewtonMetre] = parameter(
-        np.ones(3), "largest torque of a joint's drive", minimum=0.0, maximum=1000.0
+        np.ones(3),
+        "largest torque of a joint's drive",
+        minimum=0.0,
+        maximum=1000.0,
+        origin=derived("Astrobee's description of its perching arm; a third joint the same"),
     )
-    friction_J: Vector3[NewtonMetre] = parameter(np.zeros(3), "dry friction of the joints", minimum=0.0, maximum=1000.0)
+    friction_J: Vector3[NewtonMetre] = parameter(
+        np.zeros(3), "dry friction of the joints", minimum=0.0, maximum=1000.0, origin=assumed("not given")
+    )
     drag_J: Vector3[NewtonMetreSecondPerRadian] = parameter(
-        np.zeros(3), "viscous friction of the joints", minimum=0.0, maximum=1000.0
+        np.zeros(3), "viscous friction of the joints", minimum=0.0, maximum=1000.0, origin=assumed("not given")
     )
-    lock_time: Second = parameter(NEVER, "when the joints lock where they are", minimum=0.0, maximum=NEVER)
+    lock_time: Second = parameter(
+        NEVER, "when the joints lock where they are", minimum=0.0, maximum=NEVER, origin=assumed("never")
+    )
 
     def arm(self, p_BG: Floats) -> Arm:
         """Return the arm, whose gripper is at p_BG (3,) with all angles zero."""

@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from handover.cosim.blocks.block import InvalidParameters
+from handover.cosim.blocks.origins import assumed, derived, stated
 from handover.cosim.blocks.plain_rotation import (
     ZERO,
     Vector,
@@ -60,24 +61,63 @@ class BodyParameters:
     Mass and inertia are the published ones of NASA's Astrobee; the arm's length is assumed.
     """
 
-    mass: Kilogram = parameter(9.584, "mass of the robot, with joints of its base", minimum=0.1, maximum=1000.0)
+    mass: Kilogram = parameter(
+        9.584,
+        "mass of the robot, with joints of its base",
+        minimum=0.1,
+        maximum=1000.0,
+        origin=stated("Astrobee; the thesis prints 10 kg (sec. 2.1.1)"),
+    )
     I_B: Matrix3[KilogramMetre2] = parameter(
-        np.diag([0.1534, 0.1427, 0.1623]), "inertia about the centre of mass", minimum=-100.0, maximum=100.0
+        np.diag([0.1534, 0.1427, 0.1623]),
+        "inertia about the centre of mass",
+        minimum=-100.0,
+        maximum=100.0,
+        origin=stated("Astrobee"),
     )
     p_BG: Vector3[Metre] = parameter(
         np.array([-0.30, 0.0, 0.0]),
         "the gripper seen from the centre of mass, with all joints at zero",
         minimum=-5.0,
         maximum=5.0,
+        origin=assumed("not given: Astrobee's arm stretched out"),
     )
-    p_WB_0: Vector3[Metre] = parameter(np.array([0.30, -0.07, 0.0]), "position of the centre of mass at the start")
-    q_WB_0: Vector4[Number] = parameter(np.array([1.0, 0.0, 0.0, 0.0]), "orientation at the start, a unit quaternion")
-    v_WB_0: Vector3[MetrePerSecond] = parameter(np.zeros(3), "velocity at the start", minimum=-10.0, maximum=10.0)
+    p_WB_0: Vector3[Metre] = parameter(
+        np.array([0.30, -0.07, 0.0]),
+        "position of the centre of mass at the start",
+        origin=derived("sec. 4.1.3: the gripper at the handover place, with the arm as assumed"),
+    )
+    q_WB_0: Vector4[Number] = parameter(
+        np.array([1.0, 0.0, 0.0, 0.0]), "orientation at the start, a unit quaternion", origin=stated("sec. 4.1.3")
+    )
+    v_WB_0: Vector3[MetrePerSecond] = parameter(
+        np.zeros(3),
+        "velocity at the start",
+        minimum=-10.0,
+        maximum=10.0,
+        origin=derived("sec. 4.1.3: the initial state is the desired one, at rest"),
+    )
     w_WB_0: Vector3[RadianPerSecond] = parameter(
-        np.zeros(3), "angular velocity at the start, in the world", minimum=-100.0, maximum=100.0
+        np.zeros(3),
+        "angular velocity at the start, in the world",
+        minimum=-100.0,
+        maximum=100.0,
+        origin=derived("sec. 4.1.3: the initial state is the desired one, at rest"),
     )
-    substep: Second = parameter(0.016, "longest step of the integration", minimum=1e-5, maximum=0.1)
-    turn: Radian = parameter(0.004, "largest turn in a step of the integration", minimum=1e-4, maximum=1.0)
+    substep: Second = parameter(
+        0.016,
+        "longest step of the integration",
+        minimum=1e-5,
+        maximum=0.1,
+        origin=assumed("numerical: with `turn`, energy is kept to 1e-9 over 100 s of tumbling"),
+    )
+    turn: Radian = parameter(
+        0.004,
+        "largest turn in a step of the integration",
+        minimum=1e-4,
+        maximum=1.0,
+        origin=assumed("numerical: see `substep`"),
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

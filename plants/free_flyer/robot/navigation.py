@@ -9,6 +9,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from handover.cosim.blocks.block import InvalidParameters
+from handover.cosim.blocks.origins import assumed, derived
 from handover.cosim.blocks.plain_rotation import (
     IDENTITY,
     ZERO,
@@ -55,39 +56,93 @@ class Params:
     rotation about the robot's own.
     """
 
-    position_noise: Metre = parameter(0.001, "deviation of the estimated position, white", minimum=0.0, maximum=1.0)
-    attitude_noise: Radian = parameter(0.002, "deviation of the estimated attitude, white", minimum=0.0, maximum=0.5)
+    position_noise: Metre = parameter(
+        0.001,
+        "deviation of the estimated position, white",
+        minimum=0.0,
+        maximum=1.0,
+        origin=assumed("not given: white noise of the navigation's estimate"),
+    )
+    attitude_noise: Radian = parameter(
+        0.002,
+        "deviation of the estimated attitude, white",
+        minimum=0.0,
+        maximum=0.5,
+        origin=assumed("not given: white noise of the navigation's estimate"),
+    )
     velocity_noise: MetrePerSecond = parameter(
-        0.001, "deviation of the estimated velocity, white", minimum=0.0, maximum=1.0
+        0.001,
+        "deviation of the estimated velocity, white",
+        minimum=0.0,
+        maximum=1.0,
+        origin=assumed("not given: white noise of the navigation's estimate"),
     )
     rate_noise: RadianPerSecond = parameter(
-        0.002, "deviation of the estimated angular velocity, white", minimum=0.0, maximum=1.0
+        0.002,
+        "deviation of the estimated angular velocity, white",
+        minimum=0.0,
+        maximum=1.0,
+        origin=assumed("not given: white noise of the navigation's estimate"),
     )
     position_bias: Metre = parameter(
-        0.0, "deviation of the estimated position, the same for a whole run", minimum=0.0, maximum=1.0
+        0.0,
+        "deviation of the estimated position, the same for a whole run",
+        minimum=0.0,
+        maximum=1.0,
+        origin=assumed("not given: none"),
     )
     attitude_bias: Radian = parameter(
-        0.0, "deviation of the estimated attitude, the same for a whole run", minimum=0.0, maximum=0.5
+        0.0,
+        "deviation of the estimated attitude, the same for a whole run",
+        minimum=0.0,
+        maximum=0.5,
+        origin=assumed("not given: none"),
     )
     velocity_bias: MetrePerSecond = parameter(
-        0.0, "deviation of the estimated velocity, the same for a whole run", minimum=0.0, maximum=1.0
+        0.0,
+        "deviation of the estimated velocity, the same for a whole run",
+        minimum=0.0,
+        maximum=1.0,
+        origin=assumed("not given: none"),
     )
     rate_bias: RadianPerSecond = parameter(
-        0.0, "deviation of the estimated angular velocity, the same for a whole run", minimum=0.0, maximum=1.0
+        0.0,
+        "deviation of the estimated angular velocity, the same for a whole run",
+        minimum=0.0,
+        maximum=1.0,
+        origin=assumed("not given: none"),
     )
-    position_drift: Metre = parameter(0.0, "deviation of the estimated position, slow", minimum=0.0, maximum=1.0)
-    attitude_drift: Radian = parameter(0.0, "deviation of the estimated attitude, slow", minimum=0.0, maximum=0.5)
+    position_drift: Metre = parameter(
+        0.0, "deviation of the estimated position, slow", minimum=0.0, maximum=1.0, origin=assumed("not given: none")
+    )
+    attitude_drift: Radian = parameter(
+        0.0, "deviation of the estimated attitude, slow", minimum=0.0, maximum=0.5, origin=assumed("not given: none")
+    )
     velocity_drift: MetrePerSecond = parameter(
-        0.0, "deviation of the estimated velocity, slow", minimum=0.0, maximum=1.0
+        0.0, "deviation of the estimated velocity, slow", minimum=0.0, maximum=1.0, origin=assumed("not given: none")
     )
     rate_drift: RadianPerSecond = parameter(
-        0.0, "deviation of the estimated angular velocity, slow", minimum=0.0, maximum=1.0
+        0.0,
+        "deviation of the estimated angular velocity, slow",
+        minimum=0.0,
+        maximum=1.0,
+        origin=assumed("not given: none"),
     )
-    drift_time: Second = parameter(0.0, "correlation time of what is slow", minimum=0.0, maximum=1e6)
+    drift_time: Second = parameter(
+        0.0,
+        "correlation time of what is slow",
+        minimum=0.0,
+        maximum=1e6,
+        origin=assumed("not given: there is no drift"),
+    )
     update_rate: Hertz = parameter(
-        0.0, "how often there is another estimate; 0: at every step", minimum=0.0, maximum=1e4
+        0.0,
+        "how often there is another estimate; 0: at every step",
+        minimum=0.0,
+        maximum=1e4,
+        origin=derived("not given: an estimate for every cycle, as sec. 4.1.2 calls the impedance control at each"),
     )
-    delay: Second = parameter(0.0, "age of what is estimated", minimum=0.0, maximum=2.0)
+    delay: Second = parameter(0.0, "age of what is estimated", minimum=0.0, maximum=2.0, origin=assumed("not given"))
     seed: int = parameter(0, "seed of the random numbers", minimum=0)
 
     def check(self) -> None:

@@ -8,6 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from handover.cosim.blocks.origins import assumed, stated
 from handover.cosim.blocks.ports import Floats, Vector3, output, parameter
 from handover.cosim.blocks.terminals import Terminal, TerminalKind, terminal
 from handover.cosim.blocks.units import Newton, NewtonMetre, Second
@@ -25,11 +26,23 @@ class Axis(enum.IntEnum):
 class Params:
     """The pulse; force and torque are the published ones (torque 3 N m), start and duration are assumed."""
 
-    axis: Axis = parameter(Axis.X, "axis of the world along which force and torque act")
-    force: Newton = parameter(5.0, "force", minimum=-1000.0, maximum=1000.0)
-    torque: NewtonMetre = parameter(0.0, "torque", minimum=-1000.0, maximum=1000.0)
-    start: Second = parameter(1.0, "when the push begins", minimum=0.0, maximum=1e6)
-    duration: Second = parameter(0.5, "how long it lasts", minimum=0.0, maximum=1e6)
+    axis: Axis = parameter(
+        Axis.X,
+        "axis of the world along which force and torque act",
+        origin=stated("figs. 4.5 and 4.11; the others show the other axes"),
+    )
+    force: Newton = parameter(5.0, "force", minimum=-1000.0, maximum=1000.0, origin=stated("figs. 4.5-4.7, 4.11-4.13"))
+    torque: NewtonMetre = parameter(
+        0.0,
+        "torque",
+        minimum=-1000.0,
+        maximum=1000.0,
+        origin=stated("figs. 4.5-4.7: no torque with a force; the scenario's 3 N m are in push_scenario"),
+    )
+    start: Second = parameter(1.0, "when the push begins", minimum=0.0, maximum=1e6, origin=assumed("not given"))
+    duration: Second = parameter(
+        0.5, "how long it lasts", minimum=0.0, maximum=1e6, origin=assumed("not given in the text")
+    )
 
 
 @dataclass(kw_only=True)

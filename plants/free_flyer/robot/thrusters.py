@@ -11,6 +11,7 @@ from typing import ClassVar
 import numpy as np
 
 from handover.cosim.blocks.block import InvalidParameters
+from handover.cosim.blocks.origins import assumed, derived, stated
 from handover.cosim.blocks.ports import Floats, Vector2, Vector3, Vector12, output, parameter, port
 from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.terminals import Terminal, TerminalKind, terminal
@@ -47,30 +48,82 @@ class Params:
     """
 
     f_max: Vector3[Newton] = parameter(
-        np.array([0.55, 0.39, 0.45]), "largest force, an axis", minimum=0.0, maximum=1000.0
+        np.array([0.55, 0.39, 0.45]),
+        "largest force, an axis",
+        minimum=0.0,
+        maximum=1000.0,
+        origin=stated("Astrobee, about"),
     )
     tau_max: Vector3[NewtonMetre] = parameter(
-        np.array([0.064, 0.040, 0.075]), "largest torque, an axis", minimum=0.0, maximum=1000.0
+        np.array([0.064, 0.040, 0.075]),
+        "largest torque, an axis",
+        minimum=0.0,
+        maximum=1000.0,
+        origin=stated("Astrobee, about"),
     )
-    lag: Second = parameter(0.02, "time constant of the first-order lag", minimum=0.0, maximum=10.0)
-    delay: Second = parameter(0.0, "how long a command takes to arrive", minimum=0.0, maximum=10.0)
-    propulsion: Propulsion = parameter(Propulsion.LIMITED, "without limits or lag, with both, or by nozzles; all delay")
+    lag: Second = parameter(
+        0.02, "time constant of the first-order lag", minimum=0.0, maximum=10.0, origin=assumed("not given")
+    )
+    delay: Second = parameter(
+        0.0, "how long a command takes to arrive", minimum=0.0, maximum=10.0, origin=assumed("not given")
+    )
+    propulsion: Propulsion = parameter(
+        Propulsion.LIMITED,
+        "without limits or lag, with both, or by nozzles; all delay",
+        origin=assumed("Astrobee's limits hold unless a scenario says otherwise"),
+    )
     impeller_speed: RadianPerSecond = parameter(
-        293.2153, "NOZZLES: speed of the impellers, 2800 rpm", minimum=50.0, maximum=1000.0
+        293.2153,
+        "NOZZLES: speed of the impellers, 2800 rpm",
+        minimum=50.0,
+        maximum=1000.0,
+        origin=stated("Astrobee's flight software: the highest of its three speeds, 2800 rpm"),
     )
     impeller_speed_0: RadianPerSecond = parameter(
-        293.2153, "NOZZLES: their speed at the start", minimum=0.0, maximum=1000.0
+        293.2153,
+        "NOZZLES: their speed at the start",
+        minimum=0.0,
+        maximum=1000.0,
+        origin=assumed("not given: the impellers run before the robot moves"),
     )
-    impeller_lag: Second = parameter(0.5, "NOZZLES: time constant of that speed", minimum=0.0, maximum=100.0)
-    flapper_lag: Second = parameter(0.0386, "NOZZLES: time constant of the flappers", minimum=0.0, maximum=10.0)
+    impeller_lag: Second = parameter(
+        0.5,
+        "NOZZLES: time constant of that speed",
+        minimum=0.0,
+        maximum=100.0,
+        origin=assumed("not given: it shows only where impellers do not start at their speed"),
+    )
+    flapper_lag: Second = parameter(
+        0.0386,
+        "NOZZLES: time constant of the flappers",
+        minimum=0.0,
+        maximum=10.0,
+        origin=derived(
+            "k / (K_p n) of the servos in Astrobee's flight software: k = 0.001929 N m/A, K_p = 5 V/rad, n = 1/100"
+        ),
+    )
     flapper_rate: RadianPerSecond = parameter(
-        62.0, "NOZZLES: speed at which flappers turn at most", minimum=0.001, maximum=1e9
+        62.0,
+        "NOZZLES: speed at which flappers turn at most",
+        minimum=0.001,
+        maximum=1e9,
+        origin=derived("of the same servos without load at 6 V, through gears of 1/100 and 2"),
     )
     flapper_range: Vector12[Number] = parameter(
-        np.ones(12), "NOZZLES: part of its angle to which each opens, 0: stuck closed", minimum=0.0, maximum=1.0
+        np.ones(12),
+        "NOZZLES: part of its angle to which each opens, 0: stuck closed",
+        minimum=0.0,
+        maximum=1.0,
+        origin=assumed("all nozzles are whole"),
     )
     thrust_factor: Vector3[Number] = parameter(
-        np.array([1.1283, 1.3574, 1.1521]), "NOZZLES: thrust along x, y, z over 2 dp C_d^2 A", minimum=0.1, maximum=10.0
+        np.array([1.1283, 1.3574, 1.1521]),
+        "NOZZLES: thrust along x, y, z over 2 dp C_d^2 A",
+        minimum=0.1,
+        maximum=10.0,
+        origin=derived(
+            "such that f_max is the largest force along each axis; Astrobee's simulation has 1.25 for all nozzles"
+        ),
     )
 
     def check(self) -> None:

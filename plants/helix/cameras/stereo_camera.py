@@ -13,6 +13,7 @@ from numpy.random import Generator
 
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.geometry import Pinhole, looking_at, quaternion_of
+from handover.cosim.blocks.origins import assumed, derived, stated
 from handover.cosim.blocks.ports import (
     Picture1280x720,
     Polyline25,
@@ -98,76 +99,228 @@ class Params:
     markers' side. All other values are assumed.
     """
 
-    p_WC_left: Vector3[Metre] = parameter(_P_WC_LEFT, "position of the left camera in the world")
-    p_WC_right: Vector3[Metre] = parameter(_P_WC_RIGHT, "position of the right camera in the world")
+    p_WC_left: Vector3[Metre] = parameter(
+        _P_WC_LEFT,
+        "position of the left camera in the world",
+        origin=assumed(
+            "left and right camera; sec. 3.2.1 and 5.4.1 say behind the arm, at about the gripper's "
+            "height, 0.5 m (of what, is open)"
+        ),
+    )
+    p_WC_right: Vector3[Metre] = parameter(
+        _P_WC_RIGHT,
+        "position of the right camera in the world",
+        origin=assumed(
+            "left and right camera; sec. 3.2.1 and 5.4.1 say behind the arm, at about the gripper's "
+            "height, 0.5 m (of what, is open)"
+        ),
+    )
     q_WC_left: Vector4[Number] = parameter(
-        quaternion_of(looking_at(_P_WC_LEFT, _LOOKED_AT)), "orientation of the left camera in the world"
+        quaternion_of(looking_at(_P_WC_LEFT, _LOOKED_AT)),
+        "orientation of the left camera in the world",
+        origin=assumed("point in W that all cameras look at"),
     )
     q_WC_right: Vector4[Number] = parameter(
-        quaternion_of(looking_at(_P_WC_RIGHT, _LOOKED_AT)), "orientation of the right camera in the world"
+        quaternion_of(looking_at(_P_WC_RIGHT, _LOOKED_AT)),
+        "orientation of the right camera in the world",
+        origin=assumed("point in W that all cameras look at"),
     )
     intrinsics_left: Vector4[Pixel] = parameter(
-        np.array([907.0, 906.0, 642.5, 357.0]), "left camera's focal lengths and principal point: fx, fy, cx, cy"
+        np.array([907.0, 906.0, 642.5, 357.0]),
+        "left camera's focal lengths and principal point: fx, fy, cx, cy",
+        origin=assumed(
+            "f_x, f_y, c_x, c_y of left, right and third camera: focal lengths from the 78 degrees of "
+            "diagonal field of view that the Logitech Brio of sec. 3.2.1 has at 1280x720; principal "
+            "points some px off the middle, as real ones are"
+        ),
     )
     intrinsics_right: Vector4[Pixel] = parameter(
-        np.array([908.5, 907.5, 636.0, 361.5]), "right camera's focal lengths and principal point: fx, fy, cx, cy"
+        np.array([908.5, 907.5, 636.0, 361.5]),
+        "right camera's focal lengths and principal point: fx, fy, cx, cy",
+        origin=assumed(
+            "f_x, f_y, c_x, c_y of left, right and third camera: focal lengths from the 78 degrees of "
+            "diagonal field of view that the Logitech Brio of sec. 3.2.1 has at 1280x720; principal "
+            "points some px off the middle, as real ones are"
+        ),
     )
     distortion_left: Vector5[Number] = parameter(
-        np.array([0.105, -0.190, 0.0006, -0.0008, 0.060]), "left lens's distortion: k1, k2, p1, p2, k3"
+        np.array([0.105, -0.190, 0.0006, -0.0008, 0.060]),
+        "left lens's distortion: k1, k2, p1, p2, k3",
+        origin=assumed("k_1, k_2, p_1, p_2, k_3 of left, right and third camera; a webcam's size of distortion"),
     )
     distortion_right: Vector5[Number] = parameter(
-        np.array([0.092, -0.165, -0.0005, 0.0007, 0.045]), "right lens's distortion: k1, k2, p1, p2, k3"
+        np.array([0.092, -0.165, -0.0005, 0.0007, 0.045]),
+        "right lens's distortion: k1, k2, p1, p2, k3",
+        origin=assumed("k_1, k_2, p_1, p_2, k_3 of left, right and third camera; a webcam's size of distortion"),
     )
-    has_third: bool = parameter(False, "whether there is a third camera; its picture is black without")
-    p_WC_third: Vector3[Metre] = parameter(_P_WC_THIRD, "position of the third camera in the world")
+    has_third: bool = parameter(
+        False, "whether there is a third camera; its picture is black without", origin=stated("sec. 3.2.1: two cameras")
+    )
+    p_WC_third: Vector3[Metre] = parameter(
+        _P_WC_THIRD,
+        "position of the third camera in the world",
+        origin=assumed(
+            "sec. 5.4.1: one of the cameras looking down from the top, also beside the other two as a "
+            "third; where, is open: 50 degrees down on what all look at"
+        ),
+    )
     q_WC_third: Vector4[Number] = parameter(
-        quaternion_of(looking_at(_P_WC_THIRD, _LOOKED_AT)), "orientation of the third camera in the world"
+        quaternion_of(looking_at(_P_WC_THIRD, _LOOKED_AT)),
+        "orientation of the third camera in the world",
+        origin=assumed("point in W that all cameras look at"),
     )
     intrinsics_third: Vector4[Pixel] = parameter(
-        np.array([906.0, 905.5, 639.0, 358.5]), "third camera's focal lengths and principal point: fx, fy, cx, cy"
+        np.array([906.0, 905.5, 639.0, 358.5]),
+        "third camera's focal lengths and principal point: fx, fy, cx, cy",
+        origin=assumed(
+            "f_x, f_y, c_x, c_y of left, right and third camera: focal lengths from the 78 degrees of "
+            "diagonal field of view that the Logitech Brio of sec. 3.2.1 has at 1280x720; principal "
+            "points some px off the middle, as real ones are"
+        ),
     )
     distortion_third: Vector5[Number] = parameter(
-        np.array([0.098, -0.178, 0.0002, 0.0004, 0.052]), "third lens's distortion: k1, k2, p1, p2, k3"
+        np.array([0.098, -0.178, 0.0002, 0.0004, 0.052]),
+        "third lens's distortion: k1, k2, p1, p2, k3",
+        origin=assumed("k_1, k_2, p_1, p_2, k_3 of left, right and third camera; a webcam's size of distortion"),
     )
-    arm_radius: Metre = parameter(0.030, "radius of the soft arm", minimum=0.001, maximum=0.1)
-    apothem: Metre = parameter(0.034, "distance of the markers from the arm's axis", minimum=0.02, maximum=0.1)
-    marker: Metre = parameter(0.020, "side of a marker", minimum=0.005, maximum=0.05)
-    rings: int = parameter(1, "rings of markers: a second one sits above the first", minimum=1, maximum=2)
-    ball_radius: Metre = parameter(0.025, "radius of the ball", minimum=0.005, maximum=0.1)
-    blur: Pixel = parameter(0.7, "standard deviation of the lenses' blur", minimum=0.0, maximum=5.0)
-    noise: Levels = parameter(2.2, "standard deviation of the sensors' noise", minimum=0.0, maximum=60.0)
-    gradient: Number = parameter(0.22, "relative brightness of lit corner over unlit one", minimum=0.0, maximum=0.5)
-    cover_left_from: Second = parameter(0.0, "time at which a cloth covers the left lens", minimum=0.0)
-    cover_left_until: Second = parameter(0.0, "time at which the left lens is free again", minimum=0.0)
-    cover_right_from: Second = parameter(0.0, "time at which a cloth covers the right lens", minimum=0.0)
-    cover_right_until: Second = parameter(0.0, "time at which the right lens is free again", minimum=0.0)
-    light: Number = parameter(1.0, "brightness of the scene over the usual one", minimum=0.0, maximum=5.0)
-    lost_pictures: Number = parameter(0.0, "part of the pictures that arrive black", minimum=0.0, maximum=1.0)
-    decimation: int = parameter(1, "of 30 pictures a second, every so many-th is taken", minimum=1, maximum=300)
+    arm_radius: Metre = parameter(
+        0.030,
+        "radius of the soft arm",
+        minimum=0.001,
+        maximum=0.1,
+        origin=assumed("somewhat less than apothem: figs. 4 and 5 show an octagonal ring somewhat wider than the arm"),
+    )
+    apothem: Metre = parameter(
+        0.034,
+        "distance of the markers from the arm's axis",
+        minimum=0.02,
+        maximum=0.1,
+        origin=assumed(
+            "distance of the markers from the arm's axis; figs. 4 and 5 show an octagonal ring somewhat "
+            "wider than the arm"
+        ),
+    )
+    marker: Metre = parameter(0.020, "side of a marker", minimum=0.005, maximum=0.05, origin=stated("sec. 3.2.4"))
+    rings: int = parameter(
+        1,
+        "rings of markers: a second one sits above the first",
+        minimum=1,
+        maximum=2,
+        origin=stated("sec. 3.2.4: a ring of markers around the wrist"),
+    )
+    ball_radius: Metre = parameter(
+        0.025, "radius of the ball", minimum=0.005, maximum=0.1, origin=assumed("figs. 4 and 6")
+    )
+    blur: Pixel = parameter(
+        0.7,
+        "standard deviation of the lenses' blur",
+        minimum=0.0,
+        maximum=5.0,
+        origin=assumed("own choice: a webcam's size of blur"),
+    )
+    noise: Levels = parameter(
+        2.2,
+        "standard deviation of the sensors' noise",
+        minimum=0.0,
+        maximum=60.0,
+        origin=assumed("own choice: a webcam's size of noise, of 255 levels"),
+    )
+    gradient: Number = parameter(
+        0.22,
+        "relative brightness of lit corner over unlit one",
+        minimum=0.0,
+        maximum=0.5,
+        origin=assumed("own choice: a room is not lit evenly"),
+    )
+    cover_left_from: Second = parameter(
+        0.0,
+        "time at which a cloth covers the left lens",
+        minimum=0.0,
+        origin=derived("undisturbed: no lens is covered"),
+    )
+    cover_left_until: Second = parameter(
+        0.0, "time at which the left lens is free again", minimum=0.0, origin=derived("undisturbed: no lens is covered")
+    )
+    cover_right_from: Second = parameter(
+        0.0,
+        "time at which a cloth covers the right lens",
+        minimum=0.0,
+        origin=derived("undisturbed: no lens is covered"),
+    )
+    cover_right_until: Second = parameter(
+        0.0,
+        "time at which the right lens is free again",
+        minimum=0.0,
+        origin=derived("undisturbed: no lens is covered"),
+    )
+    light: Number = parameter(
+        1.0,
+        "brightness of the scene over the usual one",
+        minimum=0.0,
+        maximum=5.0,
+        origin=derived("the usual brightness, by definition"),
+    )
+    lost_pictures: Number = parameter(
+        0.0,
+        "part of the pictures that arrive black",
+        minimum=0.0,
+        maximum=1.0,
+        origin=derived("undisturbed: every picture arrives"),
+    )
+    decimation: int = parameter(
+        1,
+        "of 30 pictures a second, every so many-th is taken",
+        minimum=1,
+        maximum=300,
+        origin=assumed("every picture is taken; scenarios set it"),
+    )
     covered_markers: int = parameter(
         0,
         "markers of each ring with tape over them, those that face the cameras as the arm hangs first",
         minimum=0,
         maximum=8,
+        origin=derived("undisturbed: no tape"),
     )
     hide_ball_from: Second = parameter(
-        0.0, "time at which a card is held between the ball and the cameras", minimum=0.0
+        0.0,
+        "time at which a card is held between the ball and the cameras",
+        minimum=0.0,
+        origin=derived("undisturbed: no card"),
     )
-    hide_ball_until: Second = parameter(0.0, "time at which the card is taken away", minimum=0.0)
+    hide_ball_until: Second = parameter(
+        0.0, "time at which the card is taken away", minimum=0.0, origin=derived("undisturbed: no card")
+    )
     cover_within: Metre = parameter(
         0.0,
         "distance of gripper and ball from which on, once it came so near, cloths cover all lenses; 0: never",
         minimum=0.0,
         maximum=1.0,
+        origin=derived("undisturbed: no lens is covered"),
     )
     hide_ball_within: Metre = parameter(
-        0.0, "distance of gripper and ball from which on a card hides the ball; 0: never", minimum=0.0, maximum=1.0
+        0.0,
+        "distance of gripper and ball from which on a card hides the ball; 0: never",
+        minimum=0.0,
+        maximum=1.0,
+        origin=derived("undisturbed: no card"),
     )
     p_WD: Vector3[Metre] = parameter(
-        np.array([0.0, -0.16, -0.78]), "middle of the bowl's rim in the world, where there is a bowl"
+        np.array([0.0, -0.16, -0.78]),
+        "middle of the bowl's rim in the world, where there is a bowl",
+        origin=assumed(
+            "own choice for the unit by itself, of no effect while bowl_radius is 0; helix_use_case sets it"
+        ),
     )
-    bowl_radius: Metre = parameter(0.0, "radius of the bowl's rim; 0: there is no bowl", minimum=0.0, maximum=1.0)
-    bowl_depth: Metre = parameter(0.06, "depth of the bowl", minimum=0.001, maximum=1.0)
+    bowl_radius: Metre = parameter(
+        0.0,
+        "radius of the bowl's rim; 0: there is no bowl",
+        minimum=0.0,
+        maximum=1.0,
+        origin=derived("secs. 3.5.1 and 3.5.3: only the third experiment has a bowl"),
+    )
+    bowl_depth: Metre = parameter(
+        0.06, "depth of the bowl", minimum=0.001, maximum=1.0, origin=assumed("size of a bowl")
+    )
     seed: int = parameter(0, "seed of the noise", minimum=0)
 
     def check(self) -> None:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from handover.cosim.blocks.block import InvalidParameters
+from handover.cosim.blocks.origins import assumed, derived
 from handover.cosim.blocks.ports import Floats, Vector3, Vector4, output, parameter, port
 from handover.cosim.blocks.start_values import parameter_faults
 from handover.cosim.blocks.units import (
@@ -43,13 +44,18 @@ class Params:
     """Where the ball is offered and how still, how hand, ball and fingers touch, and the bowl; all assumed."""
 
     p_WO_0: Vector3[Metre] = parameter(
-        np.array([0.18, 0.0, -0.60]), "where the ball is offered, in the world", minimum=-2.0, maximum=2.0
+        np.array([0.18, 0.0, -0.60]),
+        "where the ball is offered, in the world",
+        minimum=-2.0,
+        maximum=2.0,
+        origin=assumed("own choice for the unit by itself; scenarios set it"),
     )
     p_WO_1: Vector3[Metre] = parameter(
         np.array([0.18, 0.0, -0.60]),
         "where the hand moves with it, if it does, in the world",
         minimum=-2.0,
         maximum=2.0,
+        origin=assumed("p_WO_0: the hand stays"),
     )
     room: Metre = parameter(
         0.12,
@@ -57,87 +63,266 @@ class Params:
         "it, until the gripper is higher",
         minimum=0.0,
         maximum=1.0,
+        origin=assumed("open fingers reach 5 cm from the gripper's axis, the palm 4.5 cm from the ball's middle"),
     )
-    move_from: Second = parameter(0.0, "time at which the hand begins to move to p_WO_1", minimum=0.0)
-    move_for: Second = parameter(0.0, "how long the hand moves; 0: it stays at p_WO_0", minimum=0.0, maximum=600.0)
+    move_from: Second = parameter(
+        0.0,
+        "time at which the hand begins to move to p_WO_1",
+        minimum=0.0,
+        origin=assumed("own choice: of no effect while move_for is 0"),
+    )
+    move_for: Second = parameter(
+        0.0,
+        "how long the hand moves; 0: it stays at p_WO_0",
+        minimum=0.0,
+        maximum=600.0,
+        origin=derived("sec. 3.5.1: the hand holds the ball at one place"),
+    )
     p_OH: Vector3[Metre] = parameter(
-        np.array([0.0, 0.0, -0.04]), "middle of the palm seen from the ball, in the world", minimum=-0.2, maximum=0.2
+        np.array([0.0, 0.0, -0.04]),
+        "middle of the palm seen from the ball, in the world",
+        minimum=-0.2,
+        maximum=0.2,
+        origin=assumed("own choice: the ball's radius and half of a hand's thickness below its middle"),
     )
-    ball_mass: Kilogram = parameter(0.02, "mass of the ball", minimum=0.001, maximum=1.0)
-    gravity: MetrePerSecond2 = parameter(9.81, "gravity, along -z of the world", minimum=0.0, maximum=30.0)
-    tremor_rms: Metre = parameter(0.001, "root mean square length of the tremor", minimum=0.0, maximum=0.05)
-    tremor_frequency: Hertz = parameter(8.0, "middle of the tremor's band", minimum=0.1, maximum=50.0)
-    tremor_bandwidth: Hertz = parameter(2.0, "width of the tremor's band at half power", minimum=0.01, maximum=50.0)
-    drift_rms: Metre = parameter(0.003, "root mean square length of the drift", minimum=0.0, maximum=0.1)
-    drift_time: Second = parameter(5.0, "correlation time of the drift", minimum=0.1, maximum=1000.0)
+    ball_mass: Kilogram = parameter(
+        0.02, "mass of the ball", minimum=0.001, maximum=1.0, origin=assumed("a light ball of 25 mm radius")
+    )
+    gravity: MetrePerSecond2 = parameter(
+        9.81, "gravity, along -z of the world", minimum=0.0, maximum=30.0, origin=assumed("standard")
+    )
+    tremor_rms: Metre = parameter(
+        0.001,
+        "root mean square length of the tremor",
+        minimum=0.0,
+        maximum=0.05,
+        origin=assumed("physiological tremor of an outstretched hand"),
+    )
+    tremor_frequency: Hertz = parameter(
+        8.0,
+        "middle of the tremor's band",
+        minimum=0.1,
+        maximum=50.0,
+        origin=assumed("physiological tremor, 8 to 12 Hz"),
+    )
+    tremor_bandwidth: Hertz = parameter(
+        2.0,
+        "width of the tremor's band at half power",
+        minimum=0.01,
+        maximum=50.0,
+        origin=assumed("own choice: physiological tremor is a narrow band"),
+    )
+    drift_rms: Metre = parameter(
+        0.003,
+        "root mean square length of the drift",
+        minimum=0.0,
+        maximum=0.1,
+        origin=assumed("how still a hand is held"),
+    )
+    drift_time: Second = parameter(
+        5.0, "correlation time of the drift", minimum=0.1, maximum=1000.0, origin=assumed("how still a hand is held")
+    )
     finger_stiffness: NewtonPerMetre = parameter(
-        300.0, "stiffness of a finger of the gripper where the ball presses on it", minimum=1.0, maximum=1e4
+        300.0,
+        "stiffness of a finger of the gripper where the ball presses on it",
+        minimum=1.0,
+        maximum=1e4,
+        origin=assumed("a soft finger pulled by a tendon: three hold a ball of 20 g with about 0.4 N each"),
     )
-    finger_friction: Number = parameter(0.8, "friction between fingers and ball", minimum=0.0, maximum=3.0)
+    finger_friction: Number = parameter(
+        0.8, "friction between fingers and ball", minimum=0.0, maximum=3.0, origin=assumed("rubber on a smooth ball")
+    )
     palm_stiffness: NewtonPerMetre = parameter(
-        1000.0, "stiffness of the hand's skin where something presses on it", minimum=1.0, maximum=1e4
+        1000.0,
+        "stiffness of the hand's skin where something presses on it",
+        minimum=1.0,
+        maximum=1e4,
+        origin=assumed("skin and flesh of a palm under some newtons"),
     )
-    palm_friction: Number = parameter(0.5, "friction between hand and ball", minimum=0.0, maximum=3.0)
+    palm_friction: Number = parameter(
+        0.5, "friction between hand and ball", minimum=0.0, maximum=3.0, origin=assumed("dry skin")
+    )
     palm_rolling_friction: Number = parameter(
         0.2,
         "how far, in radii of the ball, the hand's pressure shifts before the ball rolls in it",
         minimum=0.0,
         maximum=1.0,
+        origin=assumed("the ball sinks into the palm and does not roll freely in it"),
     )
     dissipation: SecondPerMetre = parameter(
-        4.0, "damping of contacts: part by which a speed raises their force", minimum=0.0, maximum=50.0
+        4.0,
+        "damping of contacts: part by which a speed raises their force",
+        minimum=0.0,
+        maximum=50.0,
+        origin=assumed("contacts that bounce little at 0.1 m/s"),
     )
-    cup_radius: Metre = parameter(0.1, "radius of the cup that the palm makes", minimum=0.03, maximum=10.0)
-    cup_angle: Radian = parameter(0.25, "half angle of that cup; its rim is flat", minimum=0.05, maximum=1.5)
-    palm_radius: Metre = parameter(0.045, "how far the palm reaches from its middle", minimum=0.0, maximum=0.2)
-    hand_mass: Kilogram = parameter(0.5, "mass of the hand as it gives way", minimum=0.05, maximum=5.0)
+    cup_radius: Metre = parameter(
+        0.1,
+        "radius of the cup that the palm makes",
+        minimum=0.03,
+        maximum=10.0,
+        origin=assumed("a palm that is held nearly flat: the finger tips pass beside the ball"),
+    )
+    cup_angle: Radian = parameter(
+        0.25,
+        "half angle of that cup; its rim is flat",
+        minimum=0.05,
+        maximum=1.5,
+        origin=assumed("a palm that is held nearly flat: the cup is 5 cm wide and 3 mm deep"),
+    )
+    palm_radius: Metre = parameter(
+        0.045,
+        "how far the palm reaches from its middle",
+        minimum=0.0,
+        maximum=0.2,
+        origin=assumed("half the width of a palm"),
+    )
+    hand_mass: Kilogram = parameter(
+        0.5,
+        "mass of the hand as it gives way",
+        minimum=0.05,
+        maximum=5.0,
+        origin=assumed("a hand, as light as it gives way"),
+    )
     hold_stiffness: NewtonPerMetre = parameter(
-        300.0, "stiffness with which the hand is held where it is", minimum=10.0, maximum=1e4
+        300.0,
+        "stiffness with which the hand is held where it is",
+        minimum=10.0,
+        maximum=1e4,
+        origin=assumed("a relaxed arm at the hand: some hundred N/m"),
     )
-    hold_damping: NewtonSecondPerMetre = parameter(17.0, "damping of that", minimum=0.0, maximum=200.0)
+    hold_damping: NewtonSecondPerMetre = parameter(
+        17.0,
+        "damping of that",
+        minimum=0.0,
+        maximum=200.0,
+        origin=assumed("0.7 of critical, with hand_mass and hold_stiffness"),
+    )
     hold_force: Newton = parameter(
-        1.0, "force with which thumb and fingers press the ball to the palm", minimum=0.0, maximum=50.0
+        1.0,
+        "force with which thumb and fingers press the ball to the palm",
+        minimum=0.0,
+        maximum=50.0,
+        origin=assumed("a ball that is held lightly: half a newton beside it moves it"),
     )
     help_speed: MetrePerSecond = parameter(
         0.0,
         "how fast the person brings the ball between the fingers of a gripper that closes beside it; 0: not at all",
         minimum=0.0,
         maximum=1.0,
+        origin=derived("secs. 3.5 and 3.5.1 say only that the hand holds the ball; see experiment.help_speed"),
     )
-    help_within: Metre = parameter(0.08, "how near the gripper must be for that", minimum=0.0, maximum=0.5)
-    closed_grip: Number = parameter(0.95, "closure at which the gripper looks closed", minimum=0.0, maximum=1.0)
+    help_within: Metre = parameter(
+        0.08,
+        "how near the gripper must be for that",
+        minimum=0.0,
+        maximum=0.5,
+        origin=assumed("own choice: a hand's width"),
+    )
+    closed_grip: Number = parameter(
+        0.95, "closure at which the gripper looks closed", minimum=0.0, maximum=1.0, origin=assumed("what looks closed")
+    )
     felt_grasp: Newton = parameter(
-        0.1, "sum of the fingers' pressures on the ball by which the person feels the grasp", minimum=0.0, maximum=100.0
+        0.1,
+        "sum of the fingers' pressures on the ball by which the person feels the grasp",
+        minimum=0.0,
+        maximum=100.0,
+        origin=assumed("half the weight of the ball"),
     )
-    reaction_time: Second = parameter(0.3, "how long both hold until the person lets go", minimum=0.0, maximum=10.0)
+    reaction_time: Second = parameter(
+        0.3,
+        "how long both hold until the person lets go",
+        minimum=0.0,
+        maximum=10.0,
+        origin=assumed("what a person needs to let go"),
+    )
     release_time: Second = parameter(
-        0.2, "time in which the person stops pressing, before the hand withdraws", minimum=0.0, maximum=10.0
+        0.2,
+        "time in which the person stops pressing, before the hand withdraws",
+        minimum=0.0,
+        maximum=10.0,
+        origin=assumed("how fast fingers open"),
     )
     force_max: Newton = parameter(
-        5.0, "force on the hand at which the person draws it back", minimum=0.1, maximum=1000.0
+        5.0,
+        "force on the hand at which the person draws it back",
+        minimum=0.1,
+        maximum=1000.0,
+        origin=assumed("what a person who holds a hand out lets an arm press"),
     )
-    withdrawal: Metre = parameter(0.15, "how far the hand withdraws", minimum=0.0, maximum=1.0)
-    withdrawal_time: Second = parameter(1.0, "how long that takes", minimum=0.01, maximum=60.0)
-    floor: Metre = parameter(-1.2, "height at which a fallen ball rests", minimum=-100.0, maximum=2.0)
+    withdrawal: Metre = parameter(
+        0.15,
+        "how far the hand withdraws",
+        minimum=0.0,
+        maximum=1.0,
+        origin=assumed("own choice: so far that the hand is not in the arm's way"),
+    )
+    withdrawal_time: Second = parameter(
+        1.0,
+        "how long that takes",
+        minimum=0.01,
+        maximum=60.0,
+        origin=assumed("own choice: an unhurried motion of a hand"),
+    )
+    floor: Metre = parameter(
+        -1.2,
+        "height at which a fallen ball rests",
+        minimum=-100.0,
+        maximum=2.0,
+        origin=assumed("own choice: half a metre below the hanging gripper"),
+    )
     p_WD: Vector3[Metre] = parameter(
-        np.array([0.0, -0.16, -0.78]), "middle of the bowl's rim in the world, where there is a bowl", minimum=-2.0
+        np.array([0.0, -0.16, -0.78]),
+        "middle of the bowl's rim in the world, where there is a bowl",
+        minimum=-2.0,
+        origin=assumed(
+            "own choice for the unit by itself, of no effect while bowl_radius is 0; helix_use_case sets it"
+        ),
     )
-    bowl_radius: Metre = parameter(0.0, "radius of the bowl's rim; 0: there is no bowl", minimum=0.0, maximum=1.0)
-    bowl_depth: Metre = parameter(0.06, "depth of the bowl", minimum=0.001, maximum=1.0)
-    ball_radius: Metre = parameter(0.025, "radius of the ball", minimum=0.001)
+    bowl_radius: Metre = parameter(
+        0.0,
+        "radius of the bowl's rim; 0: there is no bowl",
+        minimum=0.0,
+        maximum=1.0,
+        origin=derived("secs. 3.5.1 and 3.5.3: only the third experiment has a bowl"),
+    )
+    bowl_depth: Metre = parameter(
+        0.06, "depth of the bowl", minimum=0.001, maximum=1.0, origin=assumed("size of a bowl")
+    )
+    ball_radius: Metre = parameter(
+        0.025, "radius of the ball", minimum=0.001, origin=assumed("figs. 4 and 6, as the cameras see it")
+    )
     guide_stiffness: NewtonPerMetre = parameter(
-        0.0, "stiffness with which a person leads the gripper to the ball", minimum=0.0, maximum=1000.0
+        0.0,
+        "stiffness with which a person leads the gripper to the ball",
+        minimum=0.0,
+        maximum=1000.0,
+        origin=derived("secs. 3.5.1 and 3.5.2: only in the second experiment a person leads the arm"),
     )
     guide_damping: NewtonSecondPerMetre = parameter(
-        2.0, "damping of the guided gripper, where there is guidance", minimum=0.0, maximum=100.0
+        2.0,
+        "damping of the guided gripper, where there is guidance",
+        minimum=0.0,
+        maximum=100.0,
+        origin=assumed("own choice"),
     )
     guide_height: Metre = parameter(
-        0.025, "height over the ball's middle to which the gripper is led", minimum=-0.2, maximum=0.2
+        0.025,
+        "height over the ball's middle to which the gripper is led",
+        minimum=-0.2,
+        maximum=0.2,
+        origin=assumed("where the person leads the gripper to, over the ball's middle: its top"),
     )
     guide_speed: MetrePerSecond = parameter(
-        0.1, "speed with which the person leads the gripper there", minimum=0.001, maximum=1000.0
+        0.1,
+        "speed with which the person leads the gripper there",
+        minimum=0.001,
+        maximum=1000.0,
+        origin=assumed("how fast the person leads"),
     )
-    guide_force_max: Newton = parameter(5.0, "largest force of guidance", minimum=0.0, maximum=50.0)
+    guide_force_max: Newton = parameter(
+        5.0, "largest force of guidance", minimum=0.0, maximum=50.0, origin=assumed("own choice: as force_max")
+    )
     seed: int = parameter(0, "seed of the random numbers", minimum=0)
 
     def check(self) -> None:

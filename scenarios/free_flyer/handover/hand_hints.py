@@ -9,7 +9,6 @@ from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.plants.free_flyer.hand.parameters import Params
 from handover.scenarios.experiment.live_inputs import HandHint
-from handover.scenarios.experiment.paper import paper_values
 
 _HOLD = np.array([0.0, 0.045, 0.0])
 """Where the middle of a hand that takes the object is best, seen from its centre, m: its fingers close on it there from
@@ -76,7 +75,7 @@ def _taking(record: Record, p_WH: Floats, holder: str, felt: str, *, closed: boo
 def _giving(record: Record, p_WH: Floats, holder: str, felt: str) -> HandHint:
     if holder == "BOTH":
         return HandHint(p_WH, None, holds=True, advice="The gripper has it, too: open your hand.")
-    gripper, half = Params(), 0.5 * float(np.array(paper_values("free_flyer", "person")["object_size"])[1])
+    gripper, half = Params(), 0.5 * float(np.array(Params().object_size)[1])
     axis, p_WG = rotation_of(record["person.q_WO"][-1])[:, 1], record["robot.p_WG"][-1]
     p_WO = record["person.p_WO"][-1]
     to_gripper = p_WG - p_WO

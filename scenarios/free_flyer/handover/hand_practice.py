@@ -12,9 +12,9 @@ from handover.cosim.blocks.units import Metre, Second
 from handover.cosim.record.reader import Record
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PortName, System
+from handover.plants.free_flyer.hand.parameters import Params as PersonParams
 from handover.scenarios.experiment.experiment import Evaluator, Experiment, FmuOf, Metric, Outcome
 from handover.scenarios.experiment.live_inputs import LedHand
-from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.free_flyer.handover.led_hand import NEVER_TRACKED
 
@@ -105,7 +105,7 @@ class HandPractice(Experiment[PracticeEvaluator]):
 
     def led_hand(self, parameters: PracticeParameters) -> LedHand:  # noqa: ARG002
         """Return the person's hand."""
-        person = paper_values("free_flyer", "person")
+        person = vars(PersonParams())
         x, y, z = (float(n) for n in person["p_WH_0"])
         return LedHand("person", (x, y, z), float(person["arm_reach"]), _TASK)
 

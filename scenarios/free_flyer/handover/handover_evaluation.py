@@ -6,10 +6,10 @@ A handover has one or two transfers (`Transfer`): the object passes from robot t
 import math
 from collections.abc import Mapping, Sequence
 
+from handover.controllers.free_flyer.handover_parameters import Params as DecisionParams
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PlacedUnit
 from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
-from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.free_flyer.handover.led_hand import end_of_track
 from handover.scenarios.free_flyer.handover.person_evaluation import Cause, Miss, PersonsDeeds
 from handover.scenarios.free_flyer.handover.transfer import Approach, Transfer
@@ -95,7 +95,7 @@ class HandoverEvaluator(Evaluator):
         self._codes = (-1, -1)
         self._arrival: tuple[float, float] | None = None
         self._approach: Approach | None = None  # of the phase under way, where it has a place to come to
-        self._gate = tuple(float(paper_values("free_flyer", "decision")[name]) for name in _GATE)
+        self._gate = tuple(float(vars(DecisionParams())[name]) for name in _GATE)
         self._angles: dict[str, float] = {}
         self._unprovoked = 0
         self._lost: tuple[float, str, str] | None = None  # when, who had held it, and the robot's phase
@@ -109,7 +109,7 @@ class HandoverEvaluator(Evaluator):
         self._stability, self._mismatch = dict[str, Metric](), ""
 
     def note_units(self, units: Mapping[str, PlacedUnit]) -> None:
-        """Read the limits of arrival of the unit that decides; one that has no such keeps those of `paper.toml`."""
+        """Read the limits of arrival of the unit that decides; one that has none keeps the shipped unit's."""
         self._mismatch = model_mismatch(units)
         if "decision" in units:
             start = units["decision"].start

@@ -15,8 +15,10 @@ from typing import Any, ClassVar, cast
 
 import numpy as np
 
+from handover.controllers.free_flyer.handover_parameters import Params as DecisionParams
 from handover.cosim.record.reader import Record
 from handover.cosim.system.system import PortName, System
+from handover.plants.free_flyer.hand.parameters import Params as PersonParams
 from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf
 from handover.scenarios.experiment.live_inputs import HandHint, LedHand, Pushable
 from handover.scenarios.experiment.paper import PublishedValue, paper_values
@@ -104,7 +106,7 @@ class FlyerHandover(Experiment[HandoverEvaluator]):
             InvalidParameter: the handover place is out of the person's reach, or the hand's track cannot be followed.
         """
         p = parameters
-        check_reach(p.p_WG_handover, paper_values("free_flyer", "person"))
+        check_reach(p.p_WG_handover, vars(PersonParams()))
         navigation_seed, person_seed = (int(n) for n in np.random.SeedSequence(seed).generate_state(2) >> 1)
         at = {name: np.array(value) for name, value in paper_values("free_flyer", "handover_place").items()}
         p_WO_0 = at["p_WO_0"]
@@ -146,14 +148,14 @@ class FlyerHandover(Experiment[HandoverEvaluator]):
         """Return the robot's patience for each signal that may be needed, plus time for flying."""
         waits = len(self.receivers) + self.failures
         if parameters.verify:  # a delivery that failed is repeated
-            waits += int(paper_values("free_flyer", "decision")["attempts"]) - 1
+            waits += int(DecisionParams().attempts) - 1
         return Fraction(round(1000 * parameters.patience), 1000) * waits + _FLIGHT
 
     def led_hand(self, parameters: HandoverParameters) -> LedHand | None:
         """Return the person's hand, if it comes from outside."""
         if parameters.hand is not Hand.OUTSIDE:
             return None
-        person = paper_values("free_flyer", "person")
+        person = vars(PersonParams())
         x, y, z = (float(n) for n in person["p_WH_0"])
         return LedHand("person", (x, y, z), float(person["arm_reach"]), self.asked)
 

@@ -10,7 +10,6 @@ from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.system import System
 from handover.plants.free_flyer.hand.hand_track import HandTrack, InvalidTrack, read_track
 from handover.plants.free_flyer.hand.parameters import OF_PERSON, Driver, Params
-from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.free_flyer.parameters import Hand, HandoverParameters
 
@@ -98,7 +97,7 @@ def _faults(track: HandTrack, stop: float) -> list[str]:
         faults.append("it has one row, and a hand that neither comes nor pulls; a row each 0.2 s or less is right")
     if track.times[0] >= stop:
         faults.append(f"it begins at {track.times[0]:g} s, and the run ends by {stop:g} s: let its times begin at 0 s")
-    person = paper_values("free_flyer", "person")
+    person = vars(Params())
     rest, reach = np.array(person["p_WH_0"]), float(person["arm_reach"])
     p_WH = np.array([pose.p for pose in track.poses])
     nearest = _nearest(p_WH, rest)

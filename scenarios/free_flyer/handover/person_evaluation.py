@@ -24,7 +24,7 @@ from handover.cosim.blocks.plain_rotation import (
 )
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.signals import Signals
-from handover.scenarios.experiment.paper import paper_values
+from handover.plants.free_flyer.hand.parameters import Params as PersonParams
 
 _TOUCH = 0.3
 """Force from which a hand has bumped the object, or a push has met the gripper, N (assumed; tremor gives less)."""
@@ -93,7 +93,7 @@ def _force(signals: Signals, name: str) -> float:
 
 
 def _of_person(name: str) -> Floats:
-    return np.array(paper_values("free_flyer", "person")[name], dtype=np.float64)
+    return np.array(vars(PersonParams())[name], dtype=np.float64)
 
 
 @dataclass

@@ -1,4 +1,4 @@
-"""Parameters of a push on a robot whose arm moves, and the robot that they describe; `paper.toml` has their origins."""
+"""Parameters of a push on a robot whose arm moves, and the robot that they describe."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -9,6 +9,7 @@ from handover.controllers.free_flyer.arm_impedance_controller import Params as C
 from handover.controllers.free_flyer.arm_model import ArmModel, Chain
 from handover.controllers.free_flyer.gains import ImpedanceGains
 from handover.controllers.free_flyer.ports import Behaviour as ControllerBehaviour
+from handover.cosim.blocks.origins import assumed, stated
 from handover.cosim.blocks.ports import Floats, Vector3, parameter
 from handover.cosim.blocks.units import NewtonMetre, NewtonMetreSecondPerRadian, Number, Radian, Second
 from handover.scenarios.experiment.paper import paper_values
@@ -37,30 +38,47 @@ class ArmTarget:
 class ArmPushParameters(ImpedanceParameters):
     """One push on a robot whose arm has joints; factors of the arm's length scale its links, too."""
 
-    axis: Axis = parameter(Axis.Z, "axis of W of the push")
-    joints: int = parameter(2, "number of the arm's joints", minimum=1, maximum=3)
+    axis: Axis = parameter(
+        Axis.Z,
+        "axis of W of the push",
+        origin=assumed("sec. 4.1.3: all three; across the arm its joints give way most"),
+    )
+    joints: int = parameter(
+        2, "number of the arm's joints", minimum=1, maximum=3, origin=stated("Astrobee's perching arm")
+    )
     posture: Vector3[Radian] = parameter(
         np.array([0.6, 0.5, -0.6]),
         "angles of the joints at the start, to which they go back",
         minimum=-1.5,
         maximum=1.5,
+        origin=assumed("not given: a bent arm, of which no joint is at a limit"),
     )
     tolerance: Radian = parameter(
-        10.0, "how far the drives let the joints go; 0: fixed joints, as in the thesis", minimum=0.0, maximum=10.0
+        10.0,
+        "how far the drives let the joints go; 0: fixed joints, as in the thesis",
+        minimum=0.0,
+        maximum=10.0,
+        origin=assumed("sec. 4.1.2 fixes the joints; here they move"),
     )
     rotational_damping: NewtonMetreSecondPerRadian = parameter(
         1.0,
         "rotational k_B; the 5 of table 4.1's rigid setting is unstable on Astrobee's arm",
         minimum=0.0,
         maximum=20.0,
+        origin=assumed("table 4.1, compliant; the rigid setting's 5 is unstable with joints at 62.5 Hz"),
     )
-    friction: NewtonMetre = parameter(0.0, "dry friction of the joints", minimum=0.0, maximum=1.0)
-    lock_time: Second = parameter(1e6, "when the joints lock where they are", minimum=0.0, maximum=1e6)
+    friction: NewtonMetre = parameter(
+        0.0, "dry friction of the joints", minimum=0.0, maximum=1.0, origin=assumed("not given")
+    )
+    lock_time: Second = parameter(
+        1e6, "when the joints lock where they are", minimum=0.0, maximum=1e6, origin=assumed("never")
+    )
     model_link_factor: Number = parameter(
         1.0,
         "mass and inertia of the links that the controller assumes, times the public ones",
         minimum=0.2,
         maximum=5.0,
+        origin=assumed("the controllers know the robot's arm"),
     )
 
     @property

@@ -21,8 +21,8 @@ from handover.cosim.blocks.plain_rotation import (
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PlacedUnit
 from handover.plants.free_flyer.hand.box import Box
+from handover.plants.free_flyer.large_object.parameters import Params as LargeObjectParams
 from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
-from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.free_flyer.handover.handover_evaluation import counted, not_over, within_patience
 from handover.scenarios.free_flyer.model_mismatch import model_mismatch
 from handover.scenarios.free_flyer.parameters import ROBOTS, TeamParameters, TeamTask
@@ -61,7 +61,7 @@ class TeamEvaluator(Evaluator):
         self.parameters = parameters
         self.robots = [OneRobot(), OneRobot()]
         self.done: float | None = None
-        large = paper_values("free_flyer", "large_object")
+        large = vars(LargeObjectParams())
         half = 0.5 * float(large["grip_spacing"])
         x, y, z = parameters.p_WG_handover.tolist()
         self._places = [(x, y + half, z), (x, y - half, z)]

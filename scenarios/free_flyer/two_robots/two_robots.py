@@ -7,8 +7,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from handover.controllers.free_flyer.handover_parameters import Params as DecisionParams
 from handover.cosim.record.reader import Record
 from handover.cosim.system.system import System
+from handover.plants.free_flyer.large_object.parameters import Params as LargeObjectParams
 from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf
 from handover.scenarios.experiment.live_inputs import Pushable
 from handover.scenarios.experiment.paper import paper_values
@@ -79,9 +81,8 @@ class TwoRobots(Experiment[TeamEvaluator]):
         Raises:
             InvalidParameter: the handover place is out of the person's reach, or a track is to lead the hands.
         """
-        p, large = parameters, paper_values("free_flyer", "large_object")
-        person = {"arm_reach": paper_values("free_flyer", "person")["arm_reach"], **large, "p_OH": _hold(p)["p_OH"]}
-        check_reach(p.p_WG_handover, person)
+        p, large = parameters, vars(LargeObjectParams())
+        check_reach(p.p_WG_handover, {**large, "p_OH": _hold(p)["p_OH"]})
         if p.hand_track:
             raise InvalidParameter(["hand_track: a track leads one hand; here the person is simulated, leave it empty"])
         if p.hand is Hand.OUTSIDE:
@@ -136,7 +137,7 @@ class TwoRobots(Experiment[TeamEvaluator]):
     def stop_time(self, parameters: TeamParameters) -> Fraction:
         """Return the robots' patience for each signal that may be needed, plus time for flying."""
         repeats = parameters.verify or parameters.task is TeamTask.HUMAN_TO_ROBOTS
-        waits = int(paper_values("free_flyer", "decision")["attempts"]) if repeats else 1
+        waits = int(DecisionParams().attempts) if repeats else 1
         return Fraction(round(1000 * parameters.patience), 1000) * waits + _FLIGHT
 
     def evaluator(self, parameters: TeamParameters) -> TeamEvaluator:
@@ -172,7 +173,7 @@ class TwoRobots(Experiment[TeamEvaluator]):
 
 def _hold(p: TeamParameters) -> dict[str, Any]:
     """Return with how many hands the person holds the object, and where, as parameters of the person's unit."""
-    large = paper_values("free_flyer", "large_object")
+    large = vars(LargeObjectParams())
     p_OH = np.array(large["p_OH"])
     if p.hands is Hands.TWO:
         return {"hands": 2, "p_OH": p_OH}

@@ -7,10 +7,10 @@ from typing import Any, ClassVar
 
 from matplotlib.axes import Axes
 
+from handover.plants.free_flyer.robot.thrusters import Params as ThrustersParams
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
-from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import COLOURS, figure, legend_below
 from handover.scenarios.free_flyer.handover.handovers import HandoverOfTask
 from handover.scenarios.free_flyer.parameters import Behaviour, Propulsion, Task, TaskParameters
@@ -224,7 +224,7 @@ def _late(rows: ControllerRows) -> Claim:
         if (share := rows.mean("saturated_share", found[c, Behaviour.RIGID])) is not None
     )
     delay = float(DISTURBANCES[0].parameters["delay"])
-    radius = linear_loop(Behaviour.RIGID, float(paper_values("free_flyer", "thrusters")["lag"]), delay).pole_radius
+    radius = linear_loop(Behaviour.RIGID, float(ThrustersParams().lag), delay).pole_radius
     note = (
         f"With this delay the rigid impedance loop has its largest pole at |z| = {radius:.3f}, so given it the "
         "controller does not start; where it is not given, limits of thrust keep a growing oscillation small. Share of "

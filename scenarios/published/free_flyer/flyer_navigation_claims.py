@@ -3,9 +3,10 @@
 from functools import cache
 from typing import Any
 
+from handover.controllers.free_flyer.handover_parameters import Params as DecisionParams
 from handover.controllers.free_flyer.sampled_loop import largest_stable
+from handover.plants.free_flyer.robot.thrusters import Params as ThrustersParams
 from handover.scenarios.campaign.statistics import LEVEL, two_proportions
-from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.free_flyer.parameters import Behaviour, Task
 from handover.scenarios.published.free_flyer.navigation_runs import (
     DELAY,
@@ -80,7 +81,7 @@ def _usual(runs: NavigationRuns) -> Claim:
 
 
 def _velocity_bias(runs: NavigationRuns) -> Claim:
-    gate = float(paper_values("free_flyer", "decision")["gate_speed"])
+    gate = float(DecisionParams().gate_speed)
     facts: dict[str, Any] = {
         "claim": "A robot whose velocity is biased signals as often as its bias is below the speed that counts as rest",
         "published": "",
@@ -115,7 +116,7 @@ def _velocity_bias(runs: NavigationRuns) -> Claim:
 @cache
 def _greatest_delay(behaviour: Behaviour) -> float:
     """Return about the largest delay, s, with which the linear loop with the propulsion's lag is stable."""
-    lag = float(paper_values("free_flyer", "thrusters")["lag"])
+    lag = float(ThrustersParams().lag)
     return largest_stable(lambda delay: linear_loop(behaviour, lag, round(delay, 6)).pole_radius, upper=0.3, steps=12)
 
 

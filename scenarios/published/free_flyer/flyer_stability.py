@@ -10,10 +10,10 @@ import numpy as np
 
 from handover.controllers.free_flyer.sampled_loop import largest_stable
 from handover.cosim.stepping.options import Algorithm, MasterOptions
+from handover.plants.free_flyer.robot.thrusters import Params as ThrustersParams
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
-from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import COLOURS, figure, legend_below
 from handover.scenarios.free_flyer.parameters import Behaviour
 from handover.scenarios.free_flyer.push.impedance import FlyerImpedance
@@ -212,7 +212,7 @@ def _agrees(found: _Map) -> Claim:
 
 def _pole_radius(loop: _Loop, delay: float) -> float:
     """Return the largest |z| of the controller's loop with a delay, s, to the microsecond."""
-    lag = float(paper_values("free_flyer", "thrusters")["lag"]) if loop.lags else 0.0
+    lag = float(ThrustersParams().lag) if loop.lags else 0.0
     return linear_loop(loop.behaviour, lag, round(delay, 6)).pole_radius
 
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.stats import chi
 
+from handover.controllers.free_flyer.handover_parameters import Params as DecisionParams
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.free_flyer.parameters import Behaviour, Task, TaskParameters
 from handover.scenarios.published.free_flyer.variations import USUAL, Row, Variation, has, known_rows, names_of
 
@@ -99,7 +99,7 @@ def rest_probability(deviation: float) -> float:
     must be below the state machine's `gate_speed`: the length of such a vector has the chi distribution of three
     degrees of freedom. Noise is left out: the speed is low-passed.
     """
-    gate_speed = float(paper_values("free_flyer", "decision")["gate_speed"])
+    gate_speed = float(DecisionParams().gate_speed)
     return float(chi.cdf(gate_speed / deviation, 3))
 
 

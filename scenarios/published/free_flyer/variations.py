@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
+from handover.plants.free_flyer.robot.navigation import Params as NavigationParams
 from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.free_flyer.parameters import Task
 
 Row = Mapping[str, Any]
@@ -51,7 +51,7 @@ EXACT = {f"navigation.{what}_noise": "0" for what in ESTIMATED}
 
 def noise_times(factor: float) -> Variation:
     """Return a navigation whose four noises are a factor times the default ones."""
-    usual = paper_values("free_flyer", "navigation")
+    usual = vars(NavigationParams())
     names = [f"{what}_noise" for what in ESTIMATED]
     return Variation(f"noise x {factor:g}", {f"navigation.{name}": f"{factor * usual[name]:g}" for name in names})
 

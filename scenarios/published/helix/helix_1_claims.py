@@ -20,8 +20,8 @@ from handover.scenarios.campaign.statistics import (
     time_interval,
     two_proportions,
 )
-from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.helix.evaluation import FIG_9_RESOLUTION
+from handover.scenarios.helix.parameters import settings_of
 from handover.scenarios.published.helix.helix_1_runs import Helix1Runs, missing, published, too_few
 from handover.scenarios.published.published_experiment import Claim, Verdict
 from handover.scenarios.published.verdicts import format_p_value, ratio_interval
@@ -197,7 +197,7 @@ def _takes(arm: Helix1Runs, alpha: float) -> Claim:
 
 def _stall(arm: Helix1Runs, alpha: float) -> str:
     """Return a sentence on a step size at which the error can stall above the threshold; "" for the others."""
-    settings = paper_values("helix", arm.tuning.name.lower())
+    settings = settings_of(arm.tuning)
     stall = round(settings["epsilon_pose_bound"] / alpha, 6)
     if settings["epsilon_control"] > settings["epsilon_pose_bound"] or stall < settings["threshold_grasp"]:
         return ""

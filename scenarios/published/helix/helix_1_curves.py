@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handover.controllers.helix.servo.constant_curvature import W_FROM_B, forward_kinematics
+from handover.controllers.helix.servo.servo_parameters import Params as ServoParams
 from handover.controllers.helix.servo.visual_servo import Phase
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
-from handover.scenarios.experiment.paper import paper_values
 
 _ON_BALL = [int(phase) for phase in (Phase.DESCEND, Phase.GRASP, Phase.HOLD)]
 _MODEL_SIGNALS = ("servo.q_sys", "servo.q_est", "servo.p_WO_est", "servo.p_WR_est", "servo.p_WG_est")
@@ -61,7 +61,7 @@ class RunCurves:
     @classmethod
     def of(cls, record: Record, steps: int, period: float) -> "RunCurves":
         """Read the curves of a run that took so many control steps."""
-        servo = paper_values("helix", "servo")
+        servo = vars(ServoParams())
         d_gripper, offset = float(servo["d_gripper"]), float(servo["d_grasp_offset"])
         index = rows_of_steps(record, steps, period)
         phase: NDArray[np.int64] = np.asarray(record["servo.phase"][index], dtype=np.int64)

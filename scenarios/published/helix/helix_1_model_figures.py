@@ -10,8 +10,8 @@ from pathlib import Path
 from matplotlib.axes import Axes
 
 from handover.scenarios.experiment.experiment import Figure
-from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import COLOURS, figure
+from handover.scenarios.helix.parameters import settings_of
 from handover.scenarios.published.helix.helix_1_curves import RunCurves, mean_curve
 from handover.scenarios.published.helix.helix_1_figures import draw_mean
 from handover.scenarios.published.helix.helix_1_runs import Helix1Runs, published
@@ -68,7 +68,7 @@ def draw_estimate(arm: Helix1Runs, curves: Mapping[float, Sequence[RunCurves]], 
     drawn = [alpha for alpha, runs in curves.items() if runs]
     if not drawn:
         return []
-    bound = 1000 * paper_values("helix", arm.tuning.name.lower())["epsilon_pose_bound"]
+    bound = 1000 * settings_of(arm.tuning)["epsilon_pose_bound"]
     with figure(folder / f"estimate{arm.suffix}", len(drawn), 2, size=(9.0, 0.9 + 2.2 * len(drawn))) as axes:
         for left, right, alpha in zip(axes[0::2], axes[1::2], drawn, strict=True):
             i, runs = arm.alphas.index(alpha), curves[alpha]

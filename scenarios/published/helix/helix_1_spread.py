@@ -15,6 +15,7 @@ from scipy import stats
 from scipy.stats import ttest_ind_from_stats
 
 from handover.cosim.blocks.ports import Floats
+from handover.plants.helix.arm.tendon_parameters import Params as ArmParams
 from handover.scenarios.campaign.statistics import LEVEL, MIN_SAMPLES
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
@@ -32,7 +33,7 @@ _NOTHING = Case("nothing", "", {})
 
 def _axial(factor: float) -> str:
     """Return so many times the arm's axial stiffness, N, as text."""
-    return f"{factor * paper_values('helix', 'arm')['EA']:g}"
+    return f"{factor * ArmParams().EA:g}"
 
 
 def _fitted() -> dict[str, str]:

@@ -129,7 +129,7 @@ class Helix3(PublishedExperiment):
             "beside the bowl's middle, mm",
             "failed because",
         ]
-        radius = 1e3 * paper_values("helix", "use_case")["bowl_radius"]
+        radius = 1e3 * UseCaseParameters().bowl_radius
         note = (
             "Medians; in brackets: 95 % interval by bootstrap. Beside the bowl's middle: the ball as it falls past the "
             f"rim, by ground truth; the rim's radius is {radius:.0f} mm. Hand to bowl: from when the hand lets go "

@@ -9,8 +9,10 @@ import pytest
 from support.scenarios.flyer_runs import Kept, fmu, kept, metric, run
 from support.wording import Wording
 
+from handover.controllers.free_flyer.handover_parameters import Params as DecisionParams
 from handover.cosim.record.reader import Record
 from handover.cosim.system.schedule import Schedule
+from handover.plants.free_flyer.hand.parameters import Params as PersonParams
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.free_flyer.handover.handovers import (
@@ -148,7 +150,7 @@ def test_the_plants_step_by_the_rate_of_controllers_that_have_another():
 
 
 def test_a_person_of_nominal_skill_is_the_units_own_and_less_skill_is_worse_in_all():
-    person = paper_values("free_flyer", "person")
+    person = vars(PersonParams())
     of_skill = {"sight_error", "depth_error", "timing_error", "effort_spread", "haste", "reaction_time"}
     nominal, unskilled = HandoverParameters().traits, HandoverParameters(skill=0.0).traits
     assert {name: nominal[name] for name in of_skill} == {name: person[name] for name in of_skill}
@@ -170,6 +172,6 @@ def test_the_scenario_of_any_task_is_that_of_the_task(task: Task):
 
 def test_a_robot_that_verifies_has_time_for_as_many_deliveries_as_it_attempts():
     scenario, p = RobotToHuman(), HandoverParameters(verify=True)
-    attempts = paper_values("free_flyer", "decision")["attempts"]
+    attempts = DecisionParams().attempts
     assert scenario.stop_time(p) >= attempts * p.patience
     assert scenario.stop_time(HandoverParameters()) < attempts * p.patience

@@ -12,7 +12,7 @@ from support.sketched_figures import sketches as sketches
 from support.wording import Wording
 
 from handover.cosim.record.reader import Record
-from handover.scenarios.experiment.paper import paper_values
+from handover.plants.free_flyer.large_object.parameters import Params as LargeObjectParams
 from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters
 from handover.scenarios.free_flyer.parameters import Hands, TeamParameters, TeamTask
 from handover.scenarios.free_flyer.two_robots.team_evaluation import TeamEvaluator
@@ -76,7 +76,7 @@ def test_robots_that_do_not_come_to_rest_tell_how_far_from_their_places_they_wer
     assert cause(metric(done, "decided_by")) is TeamCause.OUT_OF_REACH, done.outcome.reason
     away = re.findall(r"gripper (\d) was (\d+) mm from its place", done.outcome.reason)
     record = Record(tmp_path / "run" / "signals.parquet")
-    half = 0.5 * float(paper_values("free_flyer", "large_object")["grip_spacing"])
+    half = 0.5 * float(LargeObjectParams().grip_spacing)
     for (number, told), side in zip(away, (half, -half), strict=True):
         phase = f"decision.phase_{number}"
         given_up = {words: code for code, words in record.items(phase).items()}["GIVEN_UP"]

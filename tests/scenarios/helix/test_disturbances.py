@@ -13,11 +13,18 @@ from handover.cosim.blocks.geometry import rotation_of
 from handover.cosim.exceptions import WiringError
 from handover.cosim.system.system import System
 from handover.fmus.build import cached
-from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.helix.cameras import calibrated, camera_of, camera_parameters, marker_fault
 from handover.scenarios.helix.disturbances import Cover
 from handover.scenarios.helix.helix_handover import HelixHandover
-from handover.scenarios.helix.parameters import BoundRule, Filters, Parameters, StepRule, Tuning, WeightRule
+from handover.scenarios.helix.parameters import (
+    BoundRule,
+    Filters,
+    Parameters,
+    StepRule,
+    Tuning,
+    WeightRule,
+    settings_of,
+)
 
 
 def built(seed: int = 3, **given: Any) -> System:
@@ -101,7 +108,7 @@ def test_a_turned_camera_sees_what_lay_in_the_middle_farther_to_the_right():
 
 
 def test_filters_are_chosen_apart_from_the_tuning():
-    thesis, own = (paper_values("helix", name) for name in ("thesis", "own"))
+    thesis, own = settings_of(Tuning.THESIS), settings_of(Tuning.OWN)
     mixed = Parameters(filters=Filters.THESIS).settings
     assert (mixed["Q_wrist"], mixed["gate"], mixed["shaping_time"]) == (thesis["Q_wrist"], 0.0, own["shaping_time"])
     other = Parameters(tuning=Tuning.THESIS, filters=Filters.OWN).settings

@@ -9,7 +9,6 @@ import pytest
 import tomli
 from support.kept_runs import kept_run
 from support.scenarios.helix_signals import PICTURE, views_and_ports
-from support.scenarios.parameter_origins import assert_every_default_has_its_origin
 from support.wording import Wording
 
 import handover.scenarios.helix
@@ -20,7 +19,7 @@ from handover.cosim.system.signals import Signals
 from handover.fmus.build import cached
 from handover.plants.helix.hand.partner_parameters import Holder
 from handover.plants.helix.hand.partner_parameters import Params as HandParams
-from handover.scenarios.helix.helix_use_case import BowlPlace, HelixUseCase, UseCaseParameters
+from handover.scenarios.helix.helix_use_case import HelixUseCase, UseCaseParameters
 from handover.scenarios.helix.parameters import Tuning
 from handover.scenarios.helix.use_case_evaluation import UseCaseEvaluator
 
@@ -115,12 +114,9 @@ def test_a_bowl_that_the_arm_may_not_reach_is_warned_of_and_one_out_of_reach_ref
         wording.check(caught.value)
 
 
-def test_what_it_adds_has_an_origin():
+def test_a_tuning_sets_the_threshold_of_the_drop():
     file = Path(handover.scenarios.helix.__file__).parent / "paper.toml"
     paper = tomli.loads(file.read_text(encoding="utf-8"))
-    assert_every_default_has_its_origin(paper["use_case"], BowlPlace)
-    for name, entry in paper["bowl"].items():
-        assert getattr(HandParams(), name) == entry["value"]
     servo = UseCaseParameters().settings
     assert servo["threshold_drop"] == paper["delivery"]["threshold_drop"]["value"][Tuning.OWN]
     assert UseCaseParameters(tuning=Tuning.THESIS).settings["threshold_drop"] == 0.05

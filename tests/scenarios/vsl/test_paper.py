@@ -1,6 +1,5 @@
-"""The code's defaults are the values whose origins `paper.toml` gives."""
+"""The code has the values that `paper.toml` gives, and units agree with each other."""
 
-import dataclasses
 import math
 import pathlib
 from typing import Any
@@ -8,26 +7,20 @@ from typing import Any
 import numpy as np
 import pytest
 import tomli
-from support.scenarios.parameter_origins import assert_every_default_has_its_origin
 
 import handover.scenarios.vsl
 from handover.controllers.vsl.hybrid_kinematics import Params as KinematicsParams
 from handover.controllers.vsl.paths import Path, QuarterArc, segments_of
 from handover.controllers.vsl.trajectory_planner import Elbow
 from handover.controllers.vsl.trajectory_planner import Params as PlannerParams
+from handover.cosim.blocks.declarations import declared_variables
 from handover.cosim.blocks.ports import Floats
+from handover.cosim.blocks.variable import Causality
 from handover.plants.vsl.parameters import Params as ArmParams
-from handover.plants.vsl.vacuum_gripper import Params as GripperParams
 from handover.scenarios.cli.robots.vsl_train import vsl_train
 from handover.scenarios.vsl import training_data
-from handover.scenarios.vsl.parameters import HybridParameters, Parameters
+from handover.scenarios.vsl.parameters import Parameters
 from handover.scenarios.vsl.path_experiments import ELECTRONICS
-
-NUMERICAL = {"hinges", "hinges_dynamic", "substep", "high_frequency_damping"}
-CHOSEN_BY_THE_SCENARIO = {
-    *("motion", "link_2", "link_3", "path", "x_0", "x_g", "elbow", "pressure", "waypoints"),
-    *("method", "model", "learned", "friction_compensation", "closed_loop", "imu", "vibration_damping"),
-}
 
 Paper = dict[str, dict[str, dict[str, Any]]]
 
@@ -38,32 +31,14 @@ def paper() -> Paper:
     return tomli.loads(file.read_text(encoding="utf-8"))
 
 
-@pytest.mark.parametrize(
-    ("group", "params", "apart"),
-    [
-        ("scenario", Parameters, NUMERICAL),
-        ("hybrid", HybridParameters, {field.name for field in dataclasses.fields(Parameters)} | CHOSEN_BY_THE_SCENARIO),
-        ("planner", PlannerParams, CHOSEN_BY_THE_SCENARIO),
-        ("kinematics", KinematicsParams, CHOSEN_BY_THE_SCENARIO),
-        ("arm", ArmParams, NUMERICAL | CHOSEN_BY_THE_SCENARIO),
-        ("gripper", GripperParams, CHOSEN_BY_THE_SCENARIO),
-    ],
-    ids=["scenario", "hybrid", "planner", "kinematics", "arm", "gripper"],
-)
-def test_every_default_has_an_origin_with_its_value_and_unit(
-    paper: Paper, group: str, params: type[Any], apart: set[str]
-):
-    assert_every_default_has_its_origin(paper[group], params, {"seed", *apart})
-
-
-def test_values_that_several_groups_have_are_the_same(paper: Paper):
-    value = {group: {name: entry["value"] for name, entry in entries.items()} for group, entries in paper.items()}
+def test_values_that_several_units_have_are_the_same(paper: Paper):
+    scenario, arm, planner, kinematics = Parameters(), ArmParams(), PlannerParams(), KinematicsParams()
     for name in ("L_1", "L_2", "L_3"):
-        assert value["arm"][name] == value["planner"][name] == value["kinematics"][name]
-    assert (value["scenario"]["speed"], value["scenario"]["points"]) == (value["planner"]["V"], value["planner"]["N"])
-    np.testing.assert_array_equal(Parameters().q_0, value["arm"]["q_0"])
-    np.testing.assert_array_equal(Parameters(elbow=Elbow.DOWN).q_0, -np.array(value["arm"]["q_0"]))
-    assert [value["scenario"]["load"], value["scenario"]["pressure"]] in value["published"]["experiment_2"]
+        assert getattr(arm, name) == getattr(planner, name) == getattr(kinematics, name)
+    assert (scenario.speed, scenario.points) == (planner.V, planner.N)
+    np.testing.assert_array_equal(scenario.q_0, arm.q_0)
+    np.testing.assert_array_equal(Parameters(elbow=Elbow.DOWN).q_0, -arm.q_0)
+    assert [scenario.load, scenario.pressure] in paper["published"]["experiment_2"]["value"]
     lengths = [Parameters(path=path).length for path in (Path.LINEAR, Path.CURVE, Path.SQUARE, Path.CUSTOM)]
     assert lengths == pytest.approx([0.3, 0.1 * math.pi, 0.4, math.hypot(0.1, 0.1)])
 
@@ -71,7 +46,9 @@ def test_values_that_several_groups_have_are_the_same(paper: Paper):
 def test_the_electronics_are_those_of_the_paper_file(paper: Paper):
     group = paper["resolution"]
     assert {name: entry["value"] for name, entry in group.items()} == ELECTRONICS
-    assert {name: entry["unit"] for name, entry in group.items()} == {n: paper["arm"][n]["unit"] for n in group}
+    assert {name: entry["unit"] for name, entry in group.items()} == {
+        v.name: v.unit.symbol for v in declared_variables(ArmParams, Causality.PARAMETER) if v.name in group
+    }
 
 
 def test_the_training_is_as_stated(paper: Paper):

@@ -1,7 +1,6 @@
 """The scenario `vsl_pick_and_place`: an object is carried to its place, touched more softly by softer links."""
 
 import json
-import pathlib
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -9,13 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-import tomli
 from support.kept_runs import kept_run
 from support.scenarios.flyer_runs import metric, run
-from support.scenarios.parameter_origins import assert_every_default_has_its_origin
 from support.wording import Wording
 
-import handover.scenarios.vsl
 from handover.controllers.vsl.pick_and_place import Params, TaskPhase
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
@@ -29,11 +25,7 @@ from handover.scenarios.vsl.pick_and_place import VslPickAndPlace
 from handover.scenarios.vsl.pick_and_place_evaluation import PickAndPlaceEvaluator, PickAndPlaceParameters
 
 
-def test_defaults_have_their_origins_and_the_planner_those_of_the_scenario():
-    file = pathlib.Path(handover.scenarios.vsl.__file__).parent / "paper.toml"
-    paper = tomli.loads(file.read_text(encoding="utf-8"))
-    assert_every_default_has_its_origin(paper["pick_and_place"], PickAndPlaceParameters)
-    assert_every_default_has_its_origin(paper["task"], Params)
+def test_the_planner_has_the_defaults_of_the_scenario():
     names = {"pick": "p_WP", "place": "p_WQ", "speed": "V", "contact_speed": "V_contact"}
     names |= {"contact_pressure": "p_contact", "carry_pressure": "p_carry"}
     names |= {name: name for name in ("hover", "press", "settle", "wait")}
