@@ -219,7 +219,7 @@ def test_pages_of_units_and_scenarios_have_what_these_declare():
         assert [row[0] for row in facts["hosts"][1]] in ([], ["FMI 2", "FMI 3", "scalar FMI 3", "standalone"])
     for system in SYSTEMS:
         for name in system.scenarios:
-            facts = pages.scenario(SCENARIOS[name], system)
+            facts = pages.scenario(SCENARIOS[name])
             assert [r.name for r, _ in facts["parameters"]] == [v.name for v in SCENARIOS[name].parameters()]
             assert {place for place, _, _ in facts["places"]} <= set(SCENARIOS[name].units)
     origins = {r.name: origin for r, origin in pages.unit(UNITS["Thrusters"])["parameters"]}

@@ -110,7 +110,7 @@ def start_for(place: str, class_name: str, module: str) -> dict[str, str]:
     starts = {p.declared.name: _start(p.declared, first) for p in wanted[Causality.OUTPUT]}
     if odd := [output for output, start in starts.items() if start is None]:
         raise UsageError(f"{place}: {', '.join(odd)}: no start can be written for outputs of this kind")
-    hints = typing.get_type_hints(block.outputs, include_extras=True)
+    hints = typing.get_type_hints(block.step, include_extras=True)
     classes = {
         Causality.PARAMETER: typing.get_type_hints(block.__init__)["params"],
         Causality.INPUT: hints["u"],
@@ -153,7 +153,7 @@ def _first_outputs(block: type[Any]) -> Any:
 
     None where it begins with nothing: without pictures to look at, or on a machine that lacks what it needs.
     """
-    hints = typing.get_type_hints(block.outputs)
+    hints = typing.get_type_hints(block.step)
     try:
         return block(typing.get_type_hints(block.__init__)["params"]()).outputs(0.0, hints["u"]())
     except Exception:  # anybody's block may raise anything of inputs that it never has
