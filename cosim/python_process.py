@@ -17,8 +17,8 @@ from pathlib import Path
 
 _MODULE = "import runpy; runpy.run_module(sys.argv.pop(1), None, '__main__', True)"
 _CODE = (
-    "import sys; sys.path[:] = {path!r}; from handover.cosim.imported_elsewhere import"
-    " ImportedElsewhere; ImportedElsewhere.install(); {code}"
+    "import sys; sys.path[:] = {path!r}; import handover; handover.__path__[1:] = {beside!r}; from"
+    " handover.cosim.imported_elsewhere import ImportedElsewhere; ImportedElsewhere.install(); {code}"
 )
 
 SAFE_PATH = {"PYTHONSAFEPATH": "handover"}
@@ -34,7 +34,8 @@ def module_command(name: str, *arguments: str) -> Sequence[str]:
 
 def code_command(code: str, *arguments: str) -> Sequence[str]:
     """Return the command that runs code as `python -c CODE ARGUMENTS` does, from this process's modules."""
-    return [sys.executable, "-c", _CODE.format(path=import_path(), code=code), *arguments]
+    beside = list(sys.modules["handover"].__path__)[1:]  # of a clone that is not installed: setup.py's
+    return [sys.executable, "-c", _CODE.format(path=import_path(), beside=beside, code=code), *arguments]
 
 
 def import_path() -> list[str]:
