@@ -40,6 +40,10 @@ from handover.cosim.blocks.ports import Floats, Vector3, output, parameter
 from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.units import Newton, NewtonMetre, Number, PerSecond, PerSecond2
 
+_INNER_LOOP = assumed(
+    "tracks a step of the virtual body's force in half a second, and leaves two thirds of the weakest thrust to it"
+)
+
 __all__ = ["AdmittanceController", "Behaviour", "Inputs", "InvalidControllerParameters", "Outputs", "Params"]
 
 _NAME = "AdmittanceController"
@@ -68,44 +72,20 @@ class Params(impedance_controller.Params, LimitParams):
         origin=assumed("ten times as fast as the virtual body moves"),
     )
     k_x: PerSecond2 = parameter(
-        9.0,
-        "inner loop: acceleration per position error (assumed)",
-        minimum=0.0,
-        maximum=1e4,
-        origin=assumed(
-            "tracks a step of the virtual body's force in half a second, and leaves two thirds of the "
-            "weakest thrust to it"
-        ),
+        9.0, "inner loop: acceleration per position error (assumed)", minimum=0.0, maximum=1e4, origin=_INNER_LOOP
     )
     k_v: PerSecond = parameter(
-        6.0,
-        "inner loop: acceleration per velocity error (assumed)",
-        minimum=0.0,
-        maximum=1e4,
-        origin=assumed(
-            "tracks a step of the virtual body's force in half a second, and leaves two thirds of the "
-            "weakest thrust to it"
-        ),
+        6.0, "inner loop: acceleration per velocity error (assumed)", minimum=0.0, maximum=1e4, origin=_INNER_LOOP
     )
     k_R: PerSecond2 = parameter(
         16.0,
         "inner loop: angular acceleration per attitude error (assumed)",
         minimum=0.0,
         maximum=1e4,
-        origin=assumed(
-            "tracks a step of the virtual body's force in half a second, and leaves two thirds of the "
-            "weakest thrust to it"
-        ),
+        origin=_INNER_LOOP,
     )
     k_w: PerSecond = parameter(
-        8.0,
-        "inner loop: angular acceleration per rate error (assumed)",
-        minimum=0.0,
-        maximum=1e4,
-        origin=assumed(
-            "tracks a step of the virtual body's force in half a second, and leaves two thirds of the "
-            "weakest thrust to it"
-        ),
+        8.0, "inner loop: angular acceleration per rate error (assumed)", minimum=0.0, maximum=1e4, origin=_INNER_LOOP
     )
 
     def inner_gains(self, factor: float = 1.0) -> tuple[PidGains, PidGains]:

@@ -16,7 +16,7 @@ from handover.controllers.free_flyer.ports import Inputs as BaseInputs
 from handover.controllers.free_flyer.ports import Outputs as BaseOutputs
 from handover.controllers.free_flyer.sampled_loop import SampledLoop
 from handover.cosim.blocks.geometry import quaternion_of, rotation_of
-from handover.cosim.blocks.origins import assumed, derived, stated
+from handover.cosim.blocks.origins import NOT_GIVEN, assumed, derived, stated
 from handover.cosim.blocks.plain_rotation import quaternion, rotation_vector
 from handover.cosim.blocks.ports import Floats, Matrix3, Vector3, output, parameter, port
 from handover.cosim.blocks.units import (
@@ -141,7 +141,7 @@ class Params(GainParams):
         "expected time from a measurement to its commands' arrival at base and joints",
         minimum=0.0,
         maximum=0.2,
-        origin=assumed("not given"),
+        origin=NOT_GIVEN,
     )
     lag: Second = parameter(
         0.02,

@@ -11,7 +11,7 @@ import numpy as np
 from handover.controllers.free_flyer.body import FlyerBody
 from handover.controllers.free_flyer.gains import ImpedanceGains
 from handover.controllers.free_flyer.ports import ARM, INERTIA, MASS, PERIOD, TERMINALS, Behaviour
-from handover.cosim.blocks.origins import assumed, derived, stated
+from handover.cosim.blocks.origins import NOT_GIVEN, assumed, derived, stated
 from handover.cosim.blocks.ports import Matrix3, Vector3, parameter
 from handover.cosim.blocks.terminals import Terminal
 from handover.cosim.blocks.units import (
@@ -88,7 +88,7 @@ class RobotParams:
         "expected time from a measurement to its command's arrival at the propulsion",
         minimum=0.0,
         maximum=0.2,
-        origin=assumed("not given"),
+        origin=NOT_GIVEN,
     )
     lag: Second = parameter(
         0.02,

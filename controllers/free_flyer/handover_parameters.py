@@ -7,7 +7,7 @@ import numpy as np
 
 from handover.controllers.free_flyer.ports import ARM, Behaviour, unit_quaternion
 from handover.cosim.blocks.block import InvalidParameters
-from handover.cosim.blocks.origins import assumed, derived, stated
+from handover.cosim.blocks.origins import NOT_GIVEN, assumed, derived, stated
 from handover.cosim.blocks.plain_rotation import rotate, rotation_matrix, vector
 from handover.cosim.blocks.ports import Floats, Vector3, Vector4, parameter
 from handover.cosim.blocks.units import Metre, MetrePerSecond, MetrePerSecond2, Number, Radian, Second
@@ -73,7 +73,7 @@ class Params:
         np.array([1.0, 0.0, 0.0, 0.0]), "its orientation there", origin=stated("sec. 4.3.1: 0 orientation in all axes")
     )
     p_WO_0: Vector3[Metre] = parameter(
-        np.array([-0.10, -0.57, 0.0]), "where the object is fetched: its centre", origin=assumed("not given")
+        np.array([-0.10, -0.57, 0.0]), "where the object is fetched: its centre", origin=NOT_GIVEN
     )
     p_OG: Vector3[Metre] = parameter(
         np.array([0.0, -0.07, 0.0]),
@@ -83,17 +83,13 @@ class Params:
         origin=derived("as handover_place.p_OG"),
     )
     q_WG_object: Vector4[Number] = parameter(
-        np.array([1.0, 0.0, 0.0, 0.0]), "orientation of the gripper at the object", origin=assumed("not given")
+        np.array([1.0, 0.0, 0.0, 0.0]), "orientation of the gripper at the object", origin=NOT_GIVEN
     )
     approach: Metre = parameter(
-        0.15,
-        "length of the straight approach to the object, along -x of G",
-        minimum=0.0,
-        maximum=5.0,
-        origin=assumed("not given"),
+        0.15, "length of the straight approach to the object, along -x of G", minimum=0.0, maximum=5.0, origin=NOT_GIVEN
     )
     p_WG_retreat: Vector3[Metre] = parameter(
-        np.array([0.40, -0.07, 0.0]), "where the gripper retreats to", origin=assumed("not given")
+        np.array([0.40, -0.07, 0.0]), "where the gripper retreats to", origin=NOT_GIVEN
     )
     p_BG: Vector3[Metre] = parameter(
         ARM,
@@ -105,10 +101,10 @@ class Params:
     workspace_low: Vector3[Metre] = parameter(
         np.array([-0.30, -1.5, -1.5]),
         "smallest coordinates of gripper and robot: the person is beyond, at -x",
-        origin=assumed("not given"),
+        origin=NOT_GIVEN,
     )
     workspace_high: Vector3[Metre] = parameter(
-        np.array([2.0, 1.5, 1.5]), "largest coordinates of gripper and robot", origin=assumed("not given")
+        np.array([2.0, 1.5, 1.5]), "largest coordinates of gripper and robot", origin=NOT_GIVEN
     )
     gated: bool = parameter(
         True,
@@ -120,39 +116,37 @@ class Params:
         "distance from the handover place below which impedance control may begin",
         minimum=1e-4,
         maximum=10.0,
-        origin=assumed("not given"),
+        origin=NOT_GIVEN,
     )
     gate_speed: MetrePerSecond = parameter(
-        0.01, "speed below which the gripper is at rest", minimum=1e-4, maximum=10.0, origin=assumed("not given")
+        0.01, "speed below which the gripper is at rest", minimum=1e-4, maximum=10.0, origin=NOT_GIVEN
     )
     tolerance: Metre = parameter(
         0.01,
         "distance from the goal at which it has arrived, and at which it signals",
         minimum=1e-4,
         maximum=10.0,
-        origin=assumed("not given"),
+        origin=NOT_GIVEN,
     )
     tolerance_angle: Radian = parameter(
-        0.05, "angle at which it has arrived anywhere", minimum=1e-3, maximum=3.2, origin=assumed("not given")
+        0.05, "angle at which it has arrived anywhere", minimum=1e-3, maximum=3.2, origin=NOT_GIVEN
     )
     settle_time: Second = parameter(
-        0.5, "time at rest and in place that makes it arrived", minimum=0.0, maximum=60.0, origin=assumed("not given")
+        0.5, "time at rest and in place that makes it arrived", minimum=0.0, maximum=60.0, origin=NOT_GIVEN
     )
     gripper_time: Second = parameter(
-        1.0, "time that opening or closing takes", minimum=0.0, maximum=60.0, origin=assumed("not given")
+        1.0, "time that opening or closing takes", minimum=0.0, maximum=60.0, origin=NOT_GIVEN
     )
-    signal_time: Second = parameter(
-        1.0, "time that the light is on", minimum=0.0, maximum=60.0, origin=assumed("not given")
-    )
+    signal_time: Second = parameter(1.0, "time that the light is on", minimum=0.0, maximum=60.0, origin=NOT_GIVEN)
     pause: Second = parameter(
         4.0,
         "COLLABORATIVE: time from the release to the next signal, at least",
         minimum=0.0,
         maximum=600.0,
-        origin=assumed("not given"),
+        origin=NOT_GIVEN,
     )
     filter_time: Second = parameter(
-        0.08, "time constant of the velocity's low-pass", minimum=0.0, maximum=10.0, origin=assumed("not given")
+        0.08, "time constant of the velocity's low-pass", minimum=0.0, maximum=10.0, origin=NOT_GIVEN
     )
     gradual: bool = parameter(
         False,
@@ -164,7 +158,7 @@ class Params:
         "gradual: part of the threshold above which they follow the speed",
         minimum=0.0,
         maximum=0.95,
-        origin=assumed("not given"),
+        origin=NOT_GIVEN,
     )
     pull_acceleration: MetrePerSecond2 = parameter(
         0.15,
@@ -193,18 +187,12 @@ class Params:
         origin=assumed("not given: sec. 3.2 takes what was released for delivered"),
     )
     verify_wait: Second = parameter(
-        0.1,
-        "verify: time from the object's being free to their closing",
-        minimum=0.0,
-        maximum=60.0,
-        origin=assumed("not given"),
+        0.1, "verify: time from the object's being free to their closing", minimum=0.0, maximum=60.0, origin=NOT_GIVEN
     )
     attempts: int = parameter(
-        5, "failed receptions, or deliveries, before it gives up", minimum=1, maximum=1000, origin=assumed("not given")
+        5, "failed receptions, or deliveries, before it gives up", minimum=1, maximum=1000, origin=NOT_GIVEN
     )
-    patience: Second = parameter(
-        60.0, "time in a phase before it gives up", minimum=0.1, maximum=1e5, origin=assumed("not given")
-    )
+    patience: Second = parameter(60.0, "time in a phase before it gives up", minimum=0.1, maximum=1e5, origin=NOT_GIVEN)
 
     def velocities(self) -> tuple[float, float]:
         """Return the thresholds for release and reception; 0 for one that is neither given nor stated."""

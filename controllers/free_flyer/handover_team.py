@@ -38,6 +38,8 @@ from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.terminals import Terminal, TerminalKind, terminal
 from handover.cosim.blocks.units import Metre, MetrePerSecond, Number, Radian, RadianPerSecond
 
+_PROPOSED = assumed("sec. 6.3 proposes two robots with a larger object, and gives no values")
+
 __all__ = ["HandoverPhase", "HandoverTask", "HandoverTeam", "Inputs", "InvalidTeamParameters", "Outputs", "Params"]
 
 _NAME = "HandoverTeam"
@@ -56,33 +58,27 @@ class Params(handover_parameters.Params):
     """Those of one robot, whose places here are where the middle between both grippers goes; all are assumed."""
 
     p_WG_handover: Vector3[Metre] = parameter(
-        np.array([0.28, 0.0, 0.0]),
-        "where the middle between the grippers hands over",
-        origin=assumed("sec. 6.3 proposes two robots with a larger object, and gives no values"),
+        np.array([0.28, 0.0, 0.0]), "where the middle between the grippers hands over", origin=_PROPOSED
     )
     p_WO_0: Vector3[Metre] = parameter(
-        np.array([0.10, -0.80, 0.0]),
-        "where the object is fetched: its centre",
-        origin=assumed("sec. 6.3 proposes two robots with a larger object, and gives no values"),
+        np.array([0.10, -0.80, 0.0]), "where the object is fetched: its centre", origin=_PROPOSED
     )
     p_OG: Vector3[Metre] = parameter(
         np.array([0.28, 0.0, 0.0]),
         "middle between the places where it is gripped, seen from its centre, in the world",
         minimum=-2.0,
         maximum=2.0,
-        origin=assumed("sec. 6.3 proposes two robots with a larger object, and gives no values"),
+        origin=_PROPOSED,
     )
     p_WG_retreat: Vector3[Metre] = parameter(
-        np.array([0.68, 0.0, 0.0]),
-        "where the middle between the grippers retreats to",
-        origin=assumed("sec. 6.3 proposes two robots with a larger object, and gives no values"),
+        np.array([0.68, 0.0, 0.0]), "where the middle between the grippers retreats to", origin=_PROPOSED
     )
     grip_spacing: Metre = parameter(
         0.50,
         "between the grippers, along y of G; the first robot's is at +y",
         minimum=_CUBE,
         maximum=2.0,
-        origin=assumed("sec. 6.3 proposes two robots with a larger object, and gives no values"),
+        origin=_PROPOSED,
     )
     together: bool = parameter(
         True,

@@ -49,6 +49,9 @@ from handover.cosim.blocks.units import (
     RadianPerSecond2,
 )
 
+_PUBLIC = stated("Astrobee's public software")
+_BOUNDS = assumed("not given: bounds of the way that leave thrust for control")
+
 __all__ = ["Inputs", "InvalidControllerParameters", "Outputs", "Params", "PoseController"]
 
 _NAME = "PoseController"
@@ -58,67 +61,29 @@ _NAME = "PoseController"
 class Params(RobotParams, LimitParams):
     """Gains of Astrobee's public software; the trajectory's bounds leave half of the weakest thrust for control."""
 
-    k_P: PerSecond2 = parameter(
-        0.6, "acceleration per position error", minimum=0.0, maximum=1e4, origin=stated("Astrobee's public software")
-    )
+    k_P: PerSecond2 = parameter(0.6, "acceleration per position error", minimum=0.0, maximum=1e4, origin=_PUBLIC)
     k_I: PerSecond3 = parameter(
-        1e-4,
-        "acceleration per integral of the position error",
-        minimum=0.0,
-        maximum=1e4,
-        origin=stated("Astrobee's public software"),
+        1e-4, "acceleration per integral of the position error", minimum=0.0, maximum=1e4, origin=_PUBLIC
     )
-    k_D: PerSecond = parameter(
-        1.2, "acceleration per velocity error", minimum=0.0, maximum=1e4, origin=stated("Astrobee's public software")
-    )
+    k_D: PerSecond = parameter(1.2, "acceleration per velocity error", minimum=0.0, maximum=1e4, origin=_PUBLIC)
     k_P_R: PerSecond2 = parameter(
-        4.0,
-        "angular acceleration per attitude error",
-        minimum=0.0,
-        maximum=1e4,
-        origin=stated("Astrobee's public software"),
+        4.0, "angular acceleration per attitude error", minimum=0.0, maximum=1e4, origin=_PUBLIC
     )
     k_I_R: PerSecond3 = parameter(
-        0.002,
-        "angular acceleration per integral of that",
-        minimum=0.0,
-        maximum=1e4,
-        origin=stated("Astrobee's public software"),
+        0.002, "angular acceleration per integral of that", minimum=0.0, maximum=1e4, origin=_PUBLIC
     )
-    k_D_R: PerSecond = parameter(
-        3.2,
-        "angular acceleration per rate error",
-        minimum=0.0,
-        maximum=1e4,
-        origin=stated("Astrobee's public software"),
-    )
+    k_D_R: PerSecond = parameter(3.2, "angular acceleration per rate error", minimum=0.0, maximum=1e4, origin=_PUBLIC)
     speed: MetrePerSecond = parameter(
-        0.1,
-        "largest speed of the trajectory (assumed)",
-        minimum=1e-3,
-        maximum=10.0,
-        origin=assumed("not given: bounds of the way that leave thrust for control"),
+        0.1, "largest speed of the trajectory (assumed)", minimum=1e-3, maximum=10.0, origin=_BOUNDS
     )
     acceleration: MetrePerSecond2 = parameter(
-        0.02,
-        "largest acceleration of the trajectory (assumed)",
-        minimum=1e-4,
-        maximum=100.0,
-        origin=assumed("not given: bounds of the way that leave thrust for control"),
+        0.02, "largest acceleration of the trajectory (assumed)", minimum=1e-4, maximum=100.0, origin=_BOUNDS
     )
     rate: RadianPerSecond = parameter(
-        0.17,
-        "largest turning rate of the trajectory (assumed)",
-        minimum=1e-3,
-        maximum=10.0,
-        origin=assumed("not given: bounds of the way that leave thrust for control"),
+        0.17, "largest turning rate of the trajectory (assumed)", minimum=1e-3, maximum=10.0, origin=_BOUNDS
     )
     turning: RadianPerSecond2 = parameter(
-        0.1,
-        "largest angular acceleration of the trajectory (assumed)",
-        minimum=1e-4,
-        maximum=100.0,
-        origin=assumed("not given: bounds of the way that leave thrust for control"),
+        0.1, "largest angular acceleration of the trajectory (assumed)", minimum=1e-4, maximum=100.0, origin=_BOUNDS
     )
 
     def position_gains(self) -> PidGains:

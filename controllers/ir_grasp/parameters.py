@@ -8,7 +8,7 @@ import numpy as np
 
 from handover.controllers.ir_grasp.sensor_geometry import LARGEST_CLOSURE
 from handover.cosim.blocks.block import InvalidParameters
-from handover.cosim.blocks.origins import assumed, derived, stated
+from handover.cosim.blocks.origins import NOT_GIVEN, assumed, derived, stated
 from handover.cosim.blocks.ports import Matrix3x4, Vector2, Vector3, Vector4, parameter
 from handover.cosim.blocks.start_values import parameter_faults
 from handover.cosim.blocks.units import (
@@ -25,6 +25,12 @@ from handover.cosim.blocks.units import (
     SquareMetre,
     Tick,
 )
+
+_CURVE = assumed(
+    "eq. (11) states the form; coefficients such that 12 bits cover 4 to 65 mm (84 mm at 0 ticks, 3.8 mm at 4095)"
+)
+_TUNED = assumed("our own correction on the move; tuned on seeds below 1000")
+_TUNED_ALONG = assumed("our own correction on the move; tuned on seeds 9100 to 9399")
 
 _INPUTS = ("p_x", "p_y", "yaw", "sigma")
 
@@ -158,46 +164,10 @@ class Params:
             "both)"
         ),
     )
-    a: Metre = parameter(
-        0.062,
-        "constant of eq. (11)",
-        minimum=0.0,
-        maximum=1.0,
-        origin=assumed(
-            "eq. (11) states the form; coefficients such that 12 bits cover 4 to 65 mm (84 mm at 0 ticks, "
-            "3.8 mm at 4095)"
-        ),
-    )
-    b: PerTick = parameter(
-        -0.0030,
-        "constant of eq. (11)",
-        minimum=-1.0,
-        maximum=0.0,
-        origin=assumed(
-            "eq. (11) states the form; coefficients such that 12 bits cover 4 to 65 mm (84 mm at 0 ticks, "
-            "3.8 mm at 4095)"
-        ),
-    )
-    c: Metre = parameter(
-        0.022,
-        "constant of eq. (11)",
-        minimum=0.0,
-        maximum=1.0,
-        origin=assumed(
-            "eq. (11) states the form; coefficients such that 12 bits cover 4 to 65 mm (84 mm at 0 ticks, "
-            "3.8 mm at 4095)"
-        ),
-    )
-    d: PerTick = parameter(
-        -0.00043,
-        "constant of eq. (11)",
-        minimum=-1.0,
-        maximum=0.0,
-        origin=assumed(
-            "eq. (11) states the form; coefficients such that 12 bits cover 4 to 65 mm (84 mm at 0 ticks, "
-            "3.8 mm at 4095)"
-        ),
-    )
+    a: Metre = parameter(0.062, "constant of eq. (11)", minimum=0.0, maximum=1.0, origin=_CURVE)
+    b: PerTick = parameter(-0.0030, "constant of eq. (11)", minimum=-1.0, maximum=0.0, origin=_CURVE)
+    c: Metre = parameter(0.022, "constant of eq. (11)", minimum=0.0, maximum=1.0, origin=_CURVE)
+    d: PerTick = parameter(-0.00043, "constant of eq. (11)", minimum=-1.0, maximum=0.0, origin=_CURVE)
     epsilon: Metre = parameter(
         0.060,
         "distance up to which a finger sees the object",
@@ -247,9 +217,7 @@ class Params:
         minimum=0.0,
         origin=assumed("not given; 20 mm, 20 mm, 0.1 rad and 0.1 of closure count alike"),
     )
-    damping: Metre = parameter(
-        0.004, "lambda of the damped step", minimum=0.0, maximum=1.0, origin=assumed("not given")
-    )
+    damping: Metre = parameter(0.004, "lambda of the damped step", minimum=0.0, maximum=1.0, origin=NOT_GIVEN)
     alpha: Number = parameter(
         0.8,
         "step scaling, eq. (10)",
@@ -291,33 +259,29 @@ class Params:
         origin=assumed("not given; the fingers must not close before the object"),
     )
     recovery_step: Metre = parameter(
-        0.010, "approaching and recovering motion", minimum=0.0, maximum=0.1, origin=assumed("not given")
+        0.010, "approaching and recovering motion", minimum=0.0, maximum=0.1, origin=NOT_GIVEN
     )
     recovery_closing: Number = parameter(
-        0.05, "closing motion of a recovery", minimum=0.0, maximum=1.0, origin=assumed("not given")
+        0.05, "closing motion of a recovery", minimum=0.0, maximum=1.0, origin=NOT_GIVEN
     )
     recovery_least: Metre = parameter(
-        0.002, "recovering motion that is not halved further", minimum=0.0, maximum=0.1, origin=assumed("not given")
+        0.002, "recovering motion that is not halved further", minimum=0.0, maximum=0.1, origin=NOT_GIVEN
     )
-    max_recoveries: int = parameter(
-        25, "approaching and recovering motions at most", minimum=0, origin=assumed("not given")
-    )
+    max_recoveries: int = parameter(25, "approaching and recovering motions at most", minimum=0, origin=NOT_GIVEN)
     waited_closings: int = parameter(
         2,
         "closing motions made for a finger that is not in the cost to see",
         minimum=0,
         origin=assumed("not given; sec. V-D says that the index lags behind"),
     )
-    max_steps: int = parameter(25, "Gauss-Newton steps at most", minimum=1, origin=assumed("not given"))
+    max_steps: int = parameter(25, "Gauss-Newton steps at most", minimum=1, origin=NOT_GIVEN)
     progress: Number = parameter(
-        0.05, "part of the cost that a step must take off", minimum=0.0, maximum=1.0, origin=assumed("not given")
+        0.05, "part of the cost that a step must take off", minimum=0.0, maximum=1.0, origin=NOT_GIVEN
     )
     stalled_steps: int = parameter(
-        3, "steps in a row without progress before the hand closes", minimum=1, origin=assumed("not given")
+        3, "steps in a row without progress before the hand closes", minimum=1, origin=NOT_GIVEN
     )
-    scans: int = parameter(
-        3, "scans that a reading is the mean of", minimum=1, maximum=100, origin=assumed("not given")
-    )
+    scans: int = parameter(3, "scans that a reading is the mean of", minimum=1, maximum=100, origin=NOT_GIVEN)
     calm: Second = parameter(
         0.15,
         "rest before a reading",
@@ -329,19 +293,16 @@ class Params:
         np.array([5e-4, 5e-4, 5e-3, 5e-3]),
         "distance of encoders and command that ends a move",
         minimum=0.0,
-        origin=assumed("not given"),
+        origin=NOT_GIVEN,
     )
     move_time: Second = parameter(
-        1.5, "time after which a correcting move counts as done", minimum=0.0, maximum=60.0, origin=assumed("not given")
+        1.5, "time after which a correcting move counts as done", minimum=0.0, maximum=60.0, origin=NOT_GIVEN
     )
     travel_time: Second = parameter(
-        10.0,
-        "the same, for the travel to the pre-grasp pose and for the pull",
-        minimum=0.0,
-        origin=assumed("not given"),
+        10.0, "the same, for the travel to the pre-grasp pose and for the pull", minimum=0.0, origin=NOT_GIVEN
     )
     closing_time: Second = parameter(
-        2.0, "time that the hand is given to close", minimum=0.0, maximum=60.0, origin=assumed("not given")
+        2.0, "time that the hand is given to close", minimum=0.0, maximum=60.0, origin=NOT_GIVEN
     )
     pull_distance: Metre = parameter(
         0.15,
@@ -351,12 +312,10 @@ class Params:
         origin=assumed("not given: what counts as a successful grasp is not stated; a pull stands for lifting"),
     )
     shake_amplitude: Metre = parameter(
-        0.015, "amplitude of the shake, across the hand", minimum=0.0, maximum=0.2, origin=assumed("not given")
+        0.015, "amplitude of the shake, across the hand", minimum=0.0, maximum=0.2, origin=NOT_GIVEN
     )
-    shake_frequency: Hertz = parameter(
-        1.5, "frequency of the shake", minimum=0.01, maximum=10.0, origin=assumed("not given")
-    )
-    shake_cycles: int = parameter(3, "cycles of the shake", minimum=0, maximum=1000, origin=assumed("not given"))
+    shake_frequency: Hertz = parameter(1.5, "frequency of the shake", minimum=0.01, maximum=10.0, origin=NOT_GIVEN)
+    shake_cycles: int = parameter(3, "cycles of the shake", minimum=0, maximum=1000, origin=NOT_GIVEN)
     contact_speed: MetrePerSecond = parameter(
         0.04, "speed ahead of the strategy CONTACT", minimum=1e-3, maximum=0.3, origin=assumed("a control of our own")
     )
@@ -382,25 +341,10 @@ class Params:
         minimum=0.0,
         origin=derived("not given; of the hand's assumed tendon and joints"),
     )
-    feed: MetrePerSecond = parameter(
-        0.06,
-        "speed ahead, of FAST",
-        minimum=0.0,
-        maximum=1.0,
-        origin=assumed("our own correction on the move; tuned on seeds below 1000"),
-    )
-    rate: PerSecond = parameter(
-        5.0,
-        "rate at which FAST takes off residuals",
-        minimum=0.0,
-        maximum=50.0,
-        origin=assumed("our own correction on the move; tuned on seeds below 1000"),
-    )
+    feed: MetrePerSecond = parameter(0.06, "speed ahead, of FAST", minimum=0.0, maximum=1.0, origin=_TUNED)
+    rate: PerSecond = parameter(5.0, "rate at which FAST takes off residuals", minimum=0.0, maximum=50.0, origin=_TUNED)
     speed_limit: Vector4[Number] = parameter(
-        np.array([0.10, 0.10, 0.6, 0.5]),
-        "largest rate of each input, of FAST",
-        minimum=0.0,
-        origin=assumed("our own correction on the move; tuned on seeds below 1000"),
+        np.array([0.10, 0.10, 0.6, 0.5]), "largest rate of each input, of FAST", minimum=0.0, origin=_TUNED
     )
     depth: Metre = parameter(
         0.092,
@@ -409,42 +353,24 @@ class Params:
         maximum=0.3,
         origin=assumed("not given; 36 mm before the palm"),
     )
-    sigma_before: Number = parameter(
-        0.12,
-        "largest closure until it is there",
-        minimum=0.0,
-        maximum=1.0,
-        origin=assumed("our own correction on the move; tuned on seeds below 1000"),
-    )
+    sigma_before: Number = parameter(0.12, "largest closure until it is there", minimum=0.0, maximum=1.0, origin=_TUNED)
     one_sided: Vector3[Metre] = parameter(
         np.array([0.035, 0.060, 0.035]),
         "distance below which an object that one side sees is beside it",
         minimum=0.0,
-        origin=assumed("our own correction on the move; tuned on seeds below 1000"),
+        origin=_TUNED,
     )
     balance: Metre = parameter(
-        0.006,
-        "half the difference of the sides at which the object is centred",
-        minimum=0.0,
-        origin=assumed("our own correction on the move; tuned on seeds below 1000"),
+        0.006, "half the difference of the sides at which the object is centred", minimum=0.0, origin=_TUNED
     )
     settling: Second = parameter(
-        0.5,
-        "time given to the residuals once the object is deep enough",
-        minimum=0.0,
-        origin=assumed("our own correction on the move; tuned on seeds below 1000"),
+        0.5, "time given to the residuals once the object is deep enough", minimum=0.0, origin=_TUNED
     )
     lost_deep: Second = parameter(
-        0.1,
-        "time out of sight after which a hand that is deep enough closes",
-        minimum=0.0,
-        origin=assumed("our own correction on the move; tuned on seeds below 1000"),
+        0.1, "time out of sight after which a hand that is deep enough closes", minimum=0.0, origin=_TUNED
     )
     lost_time: Second = parameter(
-        1.0,
-        "time after which an object that was in sight is no longer awaited",
-        minimum=0.0,
-        origin=assumed("our own correction on the move; tuned on seeds below 1000"),
+        1.0, "time after which an object that was in sight is no longer awaited", minimum=0.0, origin=_TUNED
     )
     fast_reach: Vector3[Number] = parameter(
         np.array([0.15, 0.15, 0.9]),
@@ -458,32 +384,19 @@ class Params:
         "how far the search goes to the left and to the right",
         minimum=0.0,
         maximum=0.5,
-        origin=assumed("our own correction on the move; tuned on seeds below 1000"),
+        origin=_TUNED,
     )
     search_row: Metre = parameter(
-        0.025,
-        "how far ahead one crossing of the search is of the last",
-        minimum=1e-3,
-        origin=assumed("our own correction on the move; tuned on seeds below 1000"),
+        0.025, "how far ahead one crossing of the search is of the last", minimum=1e-3, origin=_TUNED
     )
     search_back: Metre = parameter(
-        0.020,
-        "how far the search begins behind the pre-grasp pose",
-        minimum=0.0,
-        origin=assumed("our own correction on the move; tuned on seeds below 1000"),
+        0.020, "how far the search begins behind the pre-grasp pose", minimum=0.0, origin=_TUNED
     )
     search_ahead: Metre = parameter(
-        0.105,
-        "how far the search goes ahead of it",
-        minimum=0.001,
-        maximum=0.5,
-        origin=assumed("our own correction on the move; tuned on seeds below 1000"),
+        0.105, "how far the search goes ahead of it", minimum=0.001, maximum=0.5, origin=_TUNED
     )
     search_guess: Metre = parameter(
-        0.055,
-        "where the hand closes if nothing was found, ahead of it",
-        minimum=0.0,
-        origin=assumed("our own correction on the move; tuned on seeds below 1000"),
+        0.055, "where the hand closes if nothing was found, ahead of it", minimum=0.0, origin=_TUNED
     )
     search_speed: MetrePerSecond = parameter(
         0.14,
@@ -512,7 +425,7 @@ class Params:
         0.010,
         "way ahead on which what one side alone sees stays as far off: it goes along",
         minimum=1e-3,
-        origin=assumed("our own correction on the move; tuned on seeds 9100 to 9399"),
+        origin=_TUNED_ALONG,
     )
     along_change: Metre = parameter(
         0.004,
@@ -524,16 +437,10 @@ class Params:
         ),
     )
     along_back: Metre = parameter(
-        0.025,
-        "how far a hand that pushes it along goes back",
-        minimum=0.0,
-        origin=assumed("our own correction on the move; tuned on seeds 9100 to 9399"),
+        0.025, "how far a hand that pushes it along goes back", minimum=0.0, origin=_TUNED_ALONG
     )
     along_across: Metre = parameter(
-        0.025,
-        "how far it then goes across, to the side that sees",
-        minimum=0.0,
-        origin=assumed("our own correction on the move; tuned on seeds 9100 to 9399"),
+        0.025, "how far it then goes across, to the side that sees", minimum=0.0, origin=_TUNED_ALONG
     )
     along_most: int = parameter(
         3, "how often it does so at most", minimum=0, origin=assumed("our own correction on the move: a grasp must end")
@@ -580,35 +487,18 @@ class Params:
         3, "how often it does so at most", minimum=0, origin=assumed("our own correction on the move: a grasp must end")
     )
     push_depth: Metre = parameter(
-        0.020,
-        "how much too far ahead the front is when that counts",
-        minimum=0.0,
-        origin=assumed("our own correction on the move; tuned on seeds below 1000"),
+        0.020, "how much too far ahead the front is when that counts", minimum=0.0, origin=_TUNED
     )
     push_limit: Metre = parameter(
-        0.010,
-        "way across that the hand may make without any effect",
-        minimum=0.0,
-        origin=assumed("our own correction on the move; tuned on seeds below 1000"),
+        0.010, "way across that the hand may make without any effect", minimum=0.0, origin=_TUNED
     )
     path_limit: Metre = parameter(
-        0.15,
-        "way ahead that it may make once it has seen the object",
-        minimum=0.0,
-        origin=assumed("our own correction on the move; tuned on seeds below 1000"),
+        0.15, "way ahead that it may make once it has seen the object", minimum=0.0, origin=_TUNED
     )
     follow_speed: MetrePerSecond = parameter(
-        0.06,
-        "largest speed at which an object is followed",
-        minimum=0.0,
-        origin=assumed("our own correction on the move; tuned on seeds below 1000"),
+        0.06, "largest speed at which an object is followed", minimum=0.0, origin=_TUNED
     )
-    rest_speed: MetrePerSecond = parameter(
-        0.003,
-        "estimated speed that is as good as rest",
-        minimum=0.0,
-        origin=assumed("our own correction on the move; tuned on seeds below 1000"),
-    )
+    rest_speed: MetrePerSecond = parameter(0.003, "estimated speed that is as good as rest", minimum=0.0, origin=_TUNED)
     ambient_rounds: int = parameter(
         8,
         "first rounds, far from the object, of which FAST takes the least finger's mean for ambient light",
@@ -630,18 +520,8 @@ class Params:
     tick_noise: Tick = parameter(
         4.0, "standard deviation of a reading", minimum=0.0, origin=assumed("not given; the readings' noise")
     )
-    jump: Metre = parameter(
-        0.006,
-        "change of a distance that no smooth surface explains",
-        minimum=0.0,
-        origin=assumed("our own correction on the move; tuned on seeds below 1000"),
-    )
-    distance_drift: Metre = parameter(
-        3e-4,
-        "random change of a distance in a round",
-        minimum=0.0,
-        origin=assumed("our own correction on the move; tuned on seeds below 1000"),
-    )
+    jump: Metre = parameter(0.006, "change of a distance that no smooth surface explains", minimum=0.0, origin=_TUNED)
+    distance_drift: Metre = parameter(3e-4, "random change of a distance in a round", minimum=0.0, origin=_TUNED)
     jacobian_offset_0: Matrix3x4[Number] = parameter(
         np.zeros((3, 4)),
         "what the Jacobian to begin with adds to the design's: output jacobian_offset of the last grasp; 0: the design",
@@ -653,50 +533,28 @@ class Params:
         np.array([0.6, 0.2, 0.05, 0.06]),
         "how far off the Jacobian to begin with may be, by input",
         minimum=0.0,
-        origin=assumed("our own correction on the move; tuned on seeds below 1000"),
+        origin=_TUNED,
     )
     jacobian_drift: Vector4[Number] = parameter(
         np.array([0.05, 0.02, 0.004, 0.006]),
         "random change of the Jacobian in a round, by input",
         minimum=0.0,
-        origin=assumed("our own correction on the move; tuned on seeds below 1000"),
+        origin=_TUNED,
     )
     jacobian_memory: Second = parameter(
-        0.5,
-        "time in which what was learnt of it fades to that",
-        minimum=0.1,
-        origin=assumed("our own correction on the move; tuned on seeds below 1000"),
+        0.5, "time in which what was learnt of it fades to that", minimum=0.1, origin=_TUNED
     )
     slope_spread: Number = parameter(
-        0.1,
-        "how far the middle moves across by way ahead, one deviation",
-        minimum=0.0,
-        origin=assumed("our own correction on the move; tuned on seeds below 1000"),
+        0.1, "how far the middle moves across by way ahead, one deviation", minimum=0.0, origin=_TUNED
     )
-    slope_drift: Number = parameter(
-        0.01,
-        "random change of that in a round",
-        minimum=0.0,
-        origin=assumed("our own correction on the move; tuned on seeds below 1000"),
-    )
+    slope_drift: Number = parameter(0.01, "random change of that in a round", minimum=0.0, origin=_TUNED)
     velocity_spread: MetrePerSecond = parameter(
-        0.012,
-        "speed of an object, one standard deviation",
-        minimum=0.0,
-        origin=assumed("our own correction on the move; tuned on seeds below 1000"),
+        0.012, "speed of an object, one standard deviation", minimum=0.0, origin=_TUNED
     )
     velocity_drift: MetrePerSecond = parameter(
-        0.0006,
-        "random change of its speed in a round",
-        minimum=0.0,
-        origin=assumed("our own correction on the move; tuned on seeds below 1000"),
+        0.0006, "random change of its speed in a round", minimum=0.0, origin=_TUNED
     )
-    velocity_after: Second = parameter(
-        0.2,
-        "time in sight before a velocity is believed",
-        minimum=0.0,
-        origin=assumed("our own correction on the move; tuned on seeds below 1000"),
-    )
+    velocity_after: Second = parameter(0.2, "time in sight before a velocity is believed", minimum=0.0, origin=_TUNED)
 
     @property
     def calibration(self) -> Calibration:

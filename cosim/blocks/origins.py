@@ -38,3 +38,7 @@ def read_off(where: str) -> Origin:
 def assumed(where: str) -> Origin:
     """Return the origin of a value that no source gives."""
     return Origin("assumed", where)
+
+
+NOT_GIVEN = assumed("not given")
+"""Origin of a value that its source leaves out."""

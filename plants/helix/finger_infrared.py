@@ -21,6 +21,8 @@ from handover.cosim.blocks.units import Metre, Number, PerTick, Radian, Tick
 from handover.plants.helix.gripper_fingers import FINGERS, finger_joints
 from handover.plants.infrared_sensor import InfraredSensor, InvalidSensorParameters
 
+_CURVE = assumed("eq. (11) of [Luberto]; coefficients are not given: as the infrared grasp's")
+
 _RINGS = ((0.0, 1), (0.5, 6), (0.9, 12))
 """Rays of a beam: part of its half angle, and how many rays lie there around its axis."""
 _WINDOW = 0.0042
@@ -42,33 +44,11 @@ class Params:
     """
 
     a: Metre = parameter(
-        0.062,
-        "a of the characteristic y = a exp(b x) + c exp(d x)",
-        minimum=-1.0,
-        maximum=1.0,
-        origin=assumed("eq. (11) of [Luberto]; coefficients are not given: as the infrared grasp's"),
+        0.062, "a of the characteristic y = a exp(b x) + c exp(d x)", minimum=-1.0, maximum=1.0, origin=_CURVE
     )
-    b: PerTick = parameter(
-        -0.0030,
-        "b of the characteristic",
-        minimum=-0.1,
-        maximum=0.1,
-        origin=assumed("eq. (11) of [Luberto]; coefficients are not given: as the infrared grasp's"),
-    )
-    c: Metre = parameter(
-        0.022,
-        "c of the characteristic",
-        minimum=-1.0,
-        maximum=1.0,
-        origin=assumed("eq. (11) of [Luberto]; coefficients are not given: as the infrared grasp's"),
-    )
-    d: PerTick = parameter(
-        -0.00043,
-        "d of the characteristic",
-        minimum=-0.1,
-        maximum=0.1,
-        origin=assumed("eq. (11) of [Luberto]; coefficients are not given: as the infrared grasp's"),
-    )
+    b: PerTick = parameter(-0.0030, "b of the characteristic", minimum=-0.1, maximum=0.1, origin=_CURVE)
+    c: Metre = parameter(0.022, "c of the characteristic", minimum=-1.0, maximum=1.0, origin=_CURVE)
+    d: PerTick = parameter(-0.00043, "d of the characteristic", minimum=-0.1, maximum=0.1, origin=_CURVE)
     nearest: Metre = parameter(
         0.004,
         "distance of the largest reading; nearer, readings fall again",

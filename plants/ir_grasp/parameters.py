@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from handover.cosim.blocks.block import InvalidParameters
-from handover.cosim.blocks.origins import assumed, stated
+from handover.cosim.blocks.origins import NOT_GIVEN, assumed, stated
 from handover.cosim.blocks.ports import Corners8, Floats, Vector2, Vector3, Vector8, parameter
 from handover.cosim.blocks.start_values import parameter_faults
 from handover.cosim.blocks.units import (
@@ -32,6 +32,13 @@ from handover.plants.ir_grasp.actuation import STIFFNESS
 from handover.plants.ir_grasp.ground import Span, bump
 from handover.plants.ir_grasp.objects import Solid, Thing, placed, polygon_corners, solid_of, with_own
 from handover.plants.ir_grasp.shapes import Disc, polygon_faults
+
+_OWN_TEST = assumed("a test of our own; not in the paper")
+_DRAWN = assumed("not given; the scenario draws it")
+_CURVE = assumed(
+    "eq. (11) states the form; coefficients such that 12 bits cover 4 to 65 mm (84 mm at 0 ticks, 3.8 mm at 4095)"
+)
+_ALIKE = assumed("not given; sensors that are alike")
 
 OUT_OF_RANGE = 0.2
 """Value of the output `range` where a sensor's ray meets no object, in m."""
@@ -80,80 +87,68 @@ class Params:
         "length and width of thing=bar",
         minimum=5e-3,
         maximum=0.3,
-        origin=assumed("a test of our own; not in the paper"),
+        origin=_OWN_TEST,
     )
     corners: Corners8[Metre] = parameter(
         PENTAGON,
         "corners of thing=polygon, counter-clockwise; the first corner_count count",
         minimum=-0.2,
         maximum=0.2,
-        origin=assumed("a test of our own; not in the paper"),
+        origin=_OWN_TEST,
     )
     corner_count: int = parameter(
         5,
         "how many corners thing=polygon has",
         minimum=3,
         maximum=8,
-        origin=assumed("a test of our own; not in the paper"),
+        origin=_OWN_TEST,
     )
-    thing_seed: int = parameter(
-        0, "which object of its family thing=drawn is", minimum=0, origin=assumed("a test of our own; not in the paper")
-    )
+    thing_seed: int = parameter(0, "which object of its family thing=drawn is", minimum=0, origin=_OWN_TEST)
     p_WO_0: Vector2[Metre] = parameter(
-        np.array([0.0, 0.0]),
-        "where it stands at the start, in the world",
-        minimum=-2.0,
-        maximum=2.0,
-        origin=assumed("not given; the scenario draws it"),
+        np.array([0.0, 0.0]), "where it stands at the start, in the world", minimum=-2.0, maximum=2.0, origin=_DRAWN
     )
     yaw_O_0: Radian = parameter(
         0.0,
         "how far it is turned from its reference pose at the start",
         minimum=-math.pi,
         maximum=math.pi,
-        origin=assumed("not given; the scenario draws it"),
+        origin=_DRAWN,
     )
     p_WH_0: Vector2[Metre] = parameter(
         np.array([-0.25, 0.0]),
         "where the wrist is at the start, in the world",
         minimum=-2.0,
         maximum=2.0,
-        origin=assumed("not given; the scenario draws it"),
+        origin=_DRAWN,
     )
     yaw_H_0: Radian = parameter(
-        0.0,
-        "orientation of the hand at the start",
-        minimum=-math.pi,
-        maximum=math.pi,
-        origin=assumed("not given; the scenario draws it"),
+        0.0, "orientation of the hand at the start", minimum=-math.pi, maximum=math.pi, origin=_DRAWN
     )
     sigma_0: Number = parameter(
-        0.0, "closure at the start: 0 open, 1 closed", minimum=0.0, maximum=1.0, origin=assumed("not given")
+        0.0, "closure at the start: 0 open, 1 closed", minimum=0.0, maximum=1.0, origin=NOT_GIVEN
     )
     table_size: Vector2[Metre] = parameter(
         np.array([1.2, 0.9]),
         "extents of the table, whose middle is the world's origin",
         minimum=0.1,
         maximum=4.0,
-        origin=assumed("not given"),
+        origin=NOT_GIVEN,
     )
     carry_velocity: Vector2[MetrePerSecond] = parameter(
         np.zeros(2),
         "velocity of the ground under the object, which carries it",
         minimum=-0.5,
         maximum=0.5,
-        origin=assumed("a test of our own; not in the paper"),
+        origin=_OWN_TEST,
     )
     carry_from: Second = parameter(
         0.0,
         "when the ground begins to carry the object",
         minimum=0.0,
         maximum=600.0,
-        origin=assumed("a test of our own; not in the paper"),
+        origin=_OWN_TEST,
     )
-    carry_until: Second = parameter(
-        12.0, "when it stops", minimum=0.0, maximum=600.0, origin=assumed("a test of our own; not in the paper")
-    )
+    carry_until: Second = parameter(12.0, "when it stops", minimum=0.0, maximum=600.0, origin=_OWN_TEST)
     nudge: Vector2[Metre] = parameter(
         np.zeros(2),
         "how far a bump takes the object along, if nothing holds it",
@@ -164,9 +159,7 @@ class Params:
     nudge_time: Second = parameter(
         4.0, "when the bump begins", minimum=0.0, maximum=600.0, origin=assumed("not given; while the reflex probes")
     )
-    nudge_speed: MetrePerSecond = parameter(
-        0.1, "speed of the bump", minimum=1e-3, maximum=0.5, origin=assumed("not given")
-    )
+    nudge_speed: MetrePerSecond = parameter(0.1, "speed of the bump", minimum=1e-3, maximum=0.5, origin=NOT_GIVEN)
     mass_O: Kilogram = parameter(
         0.0,
         "mass of the object; 0: the thing's own",
@@ -179,102 +172,58 @@ class Params:
         "shifts the centre of mass from the middle, in the object's axes",
         minimum=-0.1,
         maximum=0.1,
-        origin=assumed("a test of our own; not in the paper"),
+        origin=_OWN_TEST,
     )
     gravity: MetrePerSecond2 = parameter(
         9.81, "gravity, which presses on the table", minimum=0.0, maximum=30.0, origin=assumed("standard")
     )
     table_friction: Number = parameter(
-        0.3, "friction coefficient of object and table", minimum=0.0, maximum=2.0, origin=assumed("not given")
+        0.3, "friction coefficient of object and table", minimum=0.0, maximum=2.0, origin=NOT_GIVEN
     )
     grip_friction: Number = parameter(
-        0.6, "friction coefficient of object and hand", minimum=0.0, maximum=2.0, origin=assumed("not given")
+        0.6, "friction coefficient of object and hand", minimum=0.0, maximum=2.0, origin=NOT_GIVEN
     )
     wrist_speed: MetrePerSecond = parameter(
-        0.3, "largest speed of the wrist", minimum=1e-3, maximum=3.0, origin=assumed("not given")
+        0.3, "largest speed of the wrist", minimum=1e-3, maximum=3.0, origin=NOT_GIVEN
     )
     wrist_acceleration: MetrePerSecond2 = parameter(
-        10.0, "largest acceleration of the wrist", minimum=0.01, maximum=100.0, origin=assumed("not given")
+        10.0, "largest acceleration of the wrist", minimum=0.01, maximum=100.0, origin=NOT_GIVEN
     )
     turning_rate: RadianPerSecond = parameter(
-        1.5, "largest turning rate of the wrist", minimum=1e-3, maximum=20.0, origin=assumed("not given")
+        1.5, "largest turning rate of the wrist", minimum=1e-3, maximum=20.0, origin=NOT_GIVEN
     )
     turning_acceleration: RadianPerSecond2 = parameter(
-        50.0, "largest angular acceleration of the wrist", minimum=0.01, maximum=1000.0, origin=assumed("not given")
+        50.0, "largest angular acceleration of the wrist", minimum=0.01, maximum=1000.0, origin=NOT_GIVEN
     )
     wrist_lag: Second = parameter(
-        0.02,
-        "time constant with which the wrist settles on its command",
-        minimum=0.002,
-        maximum=1.0,
-        origin=assumed("not given"),
+        0.02, "time constant with which the wrist settles on its command", minimum=0.002, maximum=1.0, origin=NOT_GIVEN
     )
     closure_rate: PerSecond = parameter(
-        1.0, "largest rate of the closure", minimum=1e-3, maximum=20.0, origin=assumed("not given")
+        1.0, "largest rate of the closure", minimum=1e-3, maximum=20.0, origin=NOT_GIVEN
     )
     tendon_stiffness: NewtonPerMetre = parameter(
-        400.0, "stiffness k of the tendon", minimum=1.0, maximum=2000.0, origin=assumed("not given")
+        400.0, "stiffness k of the tendon", minimum=1.0, maximum=2000.0, origin=NOT_GIVEN
     )
     tendon_travel: Metre = parameter(
-        0.094,
-        "length L of tendon that the motor takes up at closure 1",
-        minimum=0.0,
-        maximum=0.3,
-        origin=assumed("not given"),
+        0.094, "length L of tendon that the motor takes up at closure 1", minimum=0.0, maximum=0.3, origin=NOT_GIVEN
     )
     joint_damping: NewtonMetreSecondPerRadian = parameter(
-        6e-3, "damping of a joint", minimum=0.0, maximum=1.0, origin=assumed("not given")
+        6e-3, "damping of a joint", minimum=0.0, maximum=1.0, origin=NOT_GIVEN
     )
-    phalanx_mass: Kilogram = parameter(
-        0.02, "mass of a phalanx", minimum=5e-3, maximum=1.0, origin=assumed("not given")
-    )
+    phalanx_mass: Kilogram = parameter(0.02, "mass of a phalanx", minimum=5e-3, maximum=1.0, origin=NOT_GIVEN)
     stiffness_tolerance: Number = parameter(
         0.0,
         "largest part by which each joint's stiffness is off its design's, drawn",
         minimum=0.0,
         maximum=0.9,
-        origin=assumed("a test of our own; not in the paper"),
+        origin=_OWN_TEST,
     )
     a: Metre = parameter(
-        0.062,
-        "a of the characteristic y = a exp(b x) + c exp(d x)",
-        minimum=-1.0,
-        maximum=1.0,
-        origin=assumed(
-            "eq. (11) states the form; coefficients such that 12 bits cover 4 to 65 mm (84 mm at 0 ticks, "
-            "3.8 mm at 4095)"
-        ),
+        0.062, "a of the characteristic y = a exp(b x) + c exp(d x)", minimum=-1.0, maximum=1.0, origin=_CURVE
     )
-    b: PerTick = parameter(
-        -0.0030,
-        "b of the characteristic",
-        minimum=-0.1,
-        maximum=0.1,
-        origin=assumed(
-            "eq. (11) states the form; coefficients such that 12 bits cover 4 to 65 mm (84 mm at 0 ticks, "
-            "3.8 mm at 4095)"
-        ),
-    )
-    c: Metre = parameter(
-        0.022,
-        "c of the characteristic",
-        minimum=-1.0,
-        maximum=1.0,
-        origin=assumed(
-            "eq. (11) states the form; coefficients such that 12 bits cover 4 to 65 mm (84 mm at 0 ticks, "
-            "3.8 mm at 4095)"
-        ),
-    )
-    d: PerTick = parameter(
-        -0.00043,
-        "d of the characteristic",
-        minimum=-0.1,
-        maximum=0.1,
-        origin=assumed(
-            "eq. (11) states the form; coefficients such that 12 bits cover 4 to 65 mm (84 mm at 0 ticks, "
-            "3.8 mm at 4095)"
-        ),
-    )
+    b: PerTick = parameter(-0.0030, "b of the characteristic", minimum=-0.1, maximum=0.1, origin=_CURVE)
+    c: Metre = parameter(0.022, "c of the characteristic", minimum=-1.0, maximum=1.0, origin=_CURVE)
+    d: PerTick = parameter(-0.00043, "d of the characteristic", minimum=-0.1, maximum=0.1, origin=_CURVE)
     nearest: Metre = parameter(
         0.004,
         "distance of the largest reading; nearer, readings fall again",
@@ -288,21 +237,17 @@ class Params:
         origin=stated("sec. V-B: operative range 4 to 65 mm"),
     )
     contact_share: Number = parameter(
-        0.4,
-        "share of the largest reading that is left at contact",
-        minimum=0.0,
-        maximum=1.0,
-        origin=assumed("not given"),
+        0.4, "share of the largest reading that is left at contact", minimum=0.0, maximum=1.0, origin=NOT_GIVEN
     )
     incidence_exponent: Number = parameter(
         1.0,
         "exponent n of the reading's fall with cos(theta)^n, theta from the normal",
         minimum=0.0,
         maximum=10.0,
-        origin=assumed("not given"),
+        origin=NOT_GIVEN,
     )
     beam: Radian = parameter(
-        0.15, "half the opening angle of a sensor's beam", minimum=0.0, maximum=0.7, origin=assumed("not given")
+        0.15, "half the opening angle of a sensor's beam", minimum=0.0, maximum=0.7, origin=NOT_GIVEN
     )
     reflectivity: Number = parameter(
         0.0,
@@ -316,7 +261,7 @@ class Params:
         "factor of the reflectivity by face: edge of a bar, box or polygon from corner 1 on, eighth of a disc",
         minimum=0.0,
         maximum=10.0,
-        origin=assumed("a test of our own; not in the paper"),
+        origin=_OWN_TEST,
     )
     gloss: Number = parameter(
         0.0,
@@ -332,50 +277,22 @@ class Params:
         maximum=1000.0,
         origin=assumed("not given; a lobe that is half as bright 5 degrees off"),
     )
-    noise: Tick = parameter(
-        4.0, "standard deviation of a reading", minimum=0.0, maximum=1000.0, origin=assumed("not given")
-    )
-    a_scale: Vector3[Number] = parameter(
-        np.ones(3),
-        "factor of a, by finger",
-        minimum=0.2,
-        maximum=5.0,
-        origin=assumed("not given; sensors that are alike"),
-    )
-    b_scale: Vector3[Number] = parameter(
-        np.ones(3),
-        "factor of b, by finger",
-        minimum=0.2,
-        maximum=5.0,
-        origin=assumed("not given; sensors that are alike"),
-    )
-    c_scale: Vector3[Number] = parameter(
-        np.ones(3),
-        "factor of c, by finger",
-        minimum=0.2,
-        maximum=5.0,
-        origin=assumed("not given; sensors that are alike"),
-    )
-    d_scale: Vector3[Number] = parameter(
-        np.ones(3),
-        "factor of d, by finger",
-        minimum=0.2,
-        maximum=5.0,
-        origin=assumed("not given; sensors that are alike"),
-    )
+    noise: Tick = parameter(4.0, "standard deviation of a reading", minimum=0.0, maximum=1000.0, origin=NOT_GIVEN)
+    a_scale: Vector3[Number] = parameter(np.ones(3), "factor of a, by finger", minimum=0.2, maximum=5.0, origin=_ALIKE)
+    b_scale: Vector3[Number] = parameter(np.ones(3), "factor of b, by finger", minimum=0.2, maximum=5.0, origin=_ALIKE)
+    c_scale: Vector3[Number] = parameter(np.ones(3), "factor of c, by finger", minimum=0.2, maximum=5.0, origin=_ALIKE)
+    d_scale: Vector3[Number] = parameter(np.ones(3), "factor of d, by finger", minimum=0.2, maximum=5.0, origin=_ALIKE)
     sensor_tolerance: Number = parameter(
         0.0,
         "largest part by which each of a, b, c, d of each finger is off besides, drawn",
         minimum=0.0,
         maximum=0.5,
-        origin=assumed("not given; sensors that are alike"),
+        origin=_ALIKE,
     )
     ambient: Tick = parameter(
-        0.0, "what ambient light adds to each reading", minimum=0.0, maximum=4095.0, origin=assumed("not given")
+        0.0, "what ambient light adds to each reading", minimum=0.0, maximum=4095.0, origin=NOT_GIVEN
     )
-    ambient_noise: Tick = parameter(
-        0.0, "standard deviation of that", minimum=0.0, maximum=1000.0, origin=assumed("not given")
-    )
+    ambient_noise: Tick = parameter(0.0, "standard deviation of that", minimum=0.0, maximum=1000.0, origin=NOT_GIVEN)
     active: int = parameter(
         1, "how many sensors are active at once", minimum=1, maximum=3, origin=stated("sec. V-B: one sensor at a time")
     )
@@ -387,53 +304,53 @@ class Params:
         origin=assumed("not given; without effect while one sensor is active at a time"),
     )
     fingers_seen: bool = parameter(
-        False, "fingers and palm hide the object from sensors and return light", origin=assumed("not given")
+        False, "fingers and palm hide the object from sensors and return light", origin=NOT_GIVEN
     )
     finger_reflectivity: Number = parameter(
-        0.5, "reflectivity of fingers and palm", minimum=0.0, maximum=2.0, origin=assumed("not given")
+        0.5, "reflectivity of fingers and palm", minimum=0.0, maximum=2.0, origin=NOT_GIVEN
     )
     wrist_noise: Metre = parameter(
-        0.0, "standard deviation of the measured wrist, by axis", minimum=0.0, maximum=0.05, origin=assumed("not given")
+        0.0, "standard deviation of the measured wrist, by axis", minimum=0.0, maximum=0.05, origin=NOT_GIVEN
     )
     heading_noise: Radian = parameter(
-        0.0, "standard deviation of the measured heading", minimum=0.0, maximum=0.5, origin=assumed("not given")
+        0.0, "standard deviation of the measured heading", minimum=0.0, maximum=0.5, origin=NOT_GIVEN
     )
     closure_noise: Number = parameter(
-        0.0, "standard deviation of the measured closure", minimum=0.0, maximum=0.5, origin=assumed("not given")
+        0.0, "standard deviation of the measured closure", minimum=0.0, maximum=0.5, origin=NOT_GIVEN
     )
     joint_noise: Radian = parameter(
-        0.0, "standard deviation of each measured joint angle", minimum=0.0, maximum=0.5, origin=assumed("not given")
+        0.0, "standard deviation of each measured joint angle", minimum=0.0, maximum=0.5, origin=NOT_GIVEN
     )
     tension_noise: Newton = parameter(
-        0.0, "standard deviation of the measured tension", minimum=0.0, maximum=10.0, origin=assumed("not given")
+        0.0, "standard deviation of the measured tension", minimum=0.0, maximum=10.0, origin=NOT_GIVEN
     )
     other_radius: Metre = parameter(
         0.0,
         "radius of a second object, a disc; 0: none",
         minimum=0.0,
         maximum=0.1,
-        origin=assumed("a test of our own; not in the paper"),
+        origin=_OWN_TEST,
     )
     p_WX_0: Vector2[Metre] = parameter(
         np.array([0.0, 0.12]),
         "where the second object stands at the start",
         minimum=-2.0,
         maximum=2.0,
-        origin=assumed("a test of our own; not in the paper"),
+        origin=_OWN_TEST,
     )
     other_mass: Kilogram = parameter(
         0.15,
         "mass of the second object",
         minimum=_MIN_MASS,
         maximum=5.0,
-        origin=assumed("a test of our own; not in the paper"),
+        origin=_OWN_TEST,
     )
     other_reflectivity: Number = parameter(
         0.9,
         "reflectivity of the second object",
         minimum=0.0,
         maximum=2.0,
-        origin=assumed("a test of our own; not in the paper"),
+        origin=_OWN_TEST,
     )
     seed: int = parameter(0, "seed of the random numbers", minimum=0)
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from handover.cosim.blocks.origins import Origin, assumed, derived, stated
+from handover.cosim.blocks.origins import NOT_GIVEN, Origin, assumed, derived, stated
 from handover.cosim.blocks.ports import Floats, Vector3, parameter
 from handover.cosim.blocks.units import Kilogram, Metre, Newton, NewtonMetre, Number, Second
 from handover.plants.free_flyer.hand.parameters import Params as PersonParams
@@ -173,9 +173,7 @@ class HandoverParameters(RobotAndModel):
         "what the thrusters are like",
         origin=assumed("the handovers are possible within Astrobee's limits"),
     )
-    delay: Second = parameter(
-        0.0, "delay between a command and its thrust", minimum=0.0, maximum=0.2, origin=assumed("not given")
-    )
+    delay: Second = parameter(0.0, "delay between a command and its thrust", minimum=0.0, maximum=0.2, origin=NOT_GIVEN)
     gradual: bool = parameter(
         False,
         "whether the fingers follow pull and push, and their grip fades as they open",
@@ -192,7 +190,7 @@ class HandoverParameters(RobotAndModel):
         " would be unstable with it; of one that they do not know, set navigation.delay",
         minimum=0.0,
         maximum=0.2,
-        origin=assumed("not given"),
+        origin=NOT_GIVEN,
     )
     gated: bool = parameter(
         True,
@@ -200,11 +198,7 @@ class HandoverParameters(RobotAndModel):
         origin=assumed("as decision.gated"),
     )
     patience: Second = parameter(
-        60.0,
-        "time in any one phase after which the robot gives up",
-        minimum=1.0,
-        maximum=600.0,
-        origin=assumed("not given"),
+        60.0, "time in any one phase after which the robot gives up", minimum=1.0, maximum=600.0, origin=NOT_GIVEN
     )
 
     @property
@@ -362,7 +356,7 @@ class ImpedanceParameters(RobotAndModel):
     torque: NewtonMetre = parameter(
         3.0, "torque of a twist", minimum=-10.0, maximum=10.0, origin=stated("figs. 4.8-4.10, 4.14-4.16")
     )
-    begin: Second = parameter(1.0, "when the push begins", minimum=0.0, maximum=60.0, origin=assumed("not given"))
+    begin: Second = parameter(1.0, "when the push begins", minimum=0.0, maximum=60.0, origin=NOT_GIVEN)
     duration: Second = parameter(
         0.5, "how long the push lasts", minimum=0.0, maximum=60.0, origin=assumed("not given in the text")
     )
@@ -371,15 +365,13 @@ class ImpedanceParameters(RobotAndModel):
         "what the thrusters are like; the published plots need ideal ones",
         origin=derived("derived from the plots of sec. 4.1.3: with Astrobee's limits the robot tumbles at 3 N m"),
     )
-    delay: Second = parameter(
-        0.0, "delay between a command and its thrust", minimum=0.0, maximum=0.2, origin=assumed("not given")
-    )
+    delay: Second = parameter(0.0, "delay between a command and its thrust", minimum=0.0, maximum=0.2, origin=NOT_GIVEN)
     navigation_delay: Second = parameter(
         0.0,
         "age of the estimate of the robot's pose and velocities, which the controller expects if delay_known",
         minimum=0.0,
         maximum=0.2,
-        origin=assumed("not given"),
+        origin=NOT_GIVEN,
     )
     delay_known: bool = parameter(
         True,
@@ -387,11 +379,7 @@ class ImpedanceParameters(RobotAndModel):
         origin=assumed("delays that are known are part of the controller's stability check"),
     )
     patience: Second = parameter(
-        60.0,
-        "time after the push by which the robot must rest",
-        minimum=1.0,
-        maximum=600.0,
-        origin=assumed("not given"),
+        60.0, "time after the push by which the robot must rest", minimum=1.0, maximum=600.0, origin=NOT_GIVEN
     )
     parallel_step: Second = parameter(
         0.002,

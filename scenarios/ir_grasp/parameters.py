@@ -20,6 +20,8 @@ from handover.plants.ir_grasp.objects import Solid, Thing, placed, polygon_corne
 from handover.plants.ir_grasp.parameters import PENTAGON
 from handover.plants.ir_grasp.shapes import polygon_faults
 
+_OWN_TEST = assumed("a test of our own; not in the paper")
+
 
 class Expected(enum.IntEnum):
     """What vision takes an object for, whatever it is: its true shape, a disc or a bar. The middle is the object's."""
@@ -46,27 +48,27 @@ class Parameters:
         "length and width of thing=bar",
         minimum=5e-3,
         maximum=0.3,
-        origin=assumed("a test of our own; not in the paper"),
+        origin=_OWN_TEST,
     )
     corners: Corners8[Metre] = parameter(
         PENTAGON,
         "corners of thing=polygon, counter-clockwise: the first corner_count, the rest may be 0",
         minimum=-0.2,
         maximum=0.2,
-        origin=assumed("a test of our own; not in the paper"),
+        origin=_OWN_TEST,
     )
     corner_count: int = parameter(
         5,
         "how many corners thing=polygon has",
         minimum=3,
         maximum=8,
-        origin=assumed("a test of our own; not in the paper"),
+        origin=_OWN_TEST,
     )
     thing_seed: int = parameter(
         0,
         "which object of its family thing=drawn is; odd ones are kept from all tuning",
         minimum=0,
-        origin=assumed("a test of our own; not in the paper"),
+        origin=_OWN_TEST,
     )
     expected: Expected = parameter(
         Expected.AS_IT_IS,
@@ -78,21 +80,21 @@ class Parameters:
         "its radius, for expected=disc",
         minimum=5e-3,
         maximum=0.1,
-        origin=assumed("a test of our own; not in the paper"),
+        origin=_OWN_TEST,
     )
     expected_size: Vector2[Metre] = parameter(
         np.array([0.11, 0.03]),
         "its length and width, for expected=bar",
         minimum=5e-3,
         maximum=0.3,
-        origin=assumed("a test of our own; not in the paper"),
+        origin=_OWN_TEST,
     )
     expected_yaw: Radian = parameter(
         0.0,
         "how far vision believes it turned from its reference pose",
         minimum=-math.pi,
         maximum=math.pi,
-        origin=assumed("a test of our own; not in the paper"),
+        origin=_OWN_TEST,
     )
     perturbed: bool = parameter(
         True, "the object was moved after vision saw it", origin=stated("table I has nominal and perturbed poses")
@@ -184,35 +186,31 @@ class Parameters:
         "how far the object was moved, in W; this and turn, if not 0, replace what is drawn",
         minimum=-0.2,
         maximum=0.2,
-        origin=assumed("a test of our own; not in the paper"),
+        origin=_OWN_TEST,
     )
     turn: Radian = parameter(
         0.0,
         "how far the object was turned",
         minimum=-math.pi,
         maximum=math.pi,
-        origin=assumed("a test of our own; not in the paper"),
+        origin=_OWN_TEST,
     )
     carried_speed: MetrePerSecond = parameter(
         0.0,
         "speed at which the ground under the object carries it",
         minimum=0.0,
         maximum=0.2,
-        origin=assumed("a test of our own; not in the paper"),
+        origin=_OWN_TEST,
     )
     carried_direction: Radian = parameter(
         math.pi / 2.0,
         "where to, counter-clockwise from the approach",
         minimum=-math.pi,
         maximum=math.pi,
-        origin=assumed("a test of our own; not in the paper"),
+        origin=_OWN_TEST,
     )
-    carried_from: Second = parameter(
-        0.0, "when it begins to carry", minimum=0.0, maximum=90.0, origin=assumed("a test of our own; not in the paper")
-    )
-    carried_until: Second = parameter(
-        12.0, "when it stops", minimum=0.0, maximum=90.0, origin=assumed("a test of our own; not in the paper")
-    )
+    carried_from: Second = parameter(0.0, "when it begins to carry", minimum=0.0, maximum=90.0, origin=_OWN_TEST)
+    carried_until: Second = parameter(12.0, "when it stops", minimum=0.0, maximum=90.0, origin=_OWN_TEST)
     nudge: Vector2[Metre] = parameter(
         np.zeros(2),
         "how far somebody bumps the object meanwhile, in W",
@@ -228,14 +226,14 @@ class Parameters:
         "radius of a second object on the table, a disc; 0: none",
         minimum=0.0,
         maximum=0.1,
-        origin=assumed("a test of our own; not in the paper"),
+        origin=_OWN_TEST,
     )
     other_place: Vector2[Metre] = parameter(
         np.array([0.0, 0.12]),
         "where the second object stands, in W",
         minimum=-2.0,
         maximum=2.0,
-        origin=assumed("a test of our own; not in the paper"),
+        origin=_OWN_TEST,
     )
     vision_position: Metre = parameter(
         0.003,

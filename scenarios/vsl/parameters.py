@@ -19,6 +19,8 @@ from handover.cosim.blocks.schedule import InvalidSchedule, Schedule
 from handover.cosim.blocks.units import Kilogram, Metre, MetrePerSecond, Number, Pascal, Second
 from handover.plants.vsl.parameters import MAX_PRESSURE, Link, Motion
 
+_ONE_ARM = assumed("one arm was built; others are of one's own")
+
 BAR = 1e5
 """Pa."""
 
@@ -171,28 +173,20 @@ class Parameters:
         "bending stiffness of both links over that of the arm that was trained on",
         minimum=0.1,
         maximum=10.0,
-        origin=assumed("one arm was built; others are of one's own"),
+        origin=_ONE_ARM,
     )
     mass_factor: Number = parameter(
-        1.0,
-        "mass of both links over that of the trained arm",
-        minimum=0.0,
-        maximum=10.0,
-        origin=assumed("one arm was built; others are of one's own"),
+        1.0, "mass of both links over that of the trained arm", minimum=0.0, maximum=10.0, origin=_ONE_ARM
     )
     friction_factor: Number = parameter(
-        1.0,
-        "friction of all gears over that of the trained arm",
-        minimum=0.0,
-        maximum=100.0,
-        origin=assumed("one arm was built; others are of one's own"),
+        1.0, "friction of all gears over that of the trained arm", minimum=0.0, maximum=100.0, origin=_ONE_ARM
     )
     joint_factor: Number = parameter(
         1.0,
         "stiffness of J2 and J3 behind their encoders over that of the trained arm",
         minimum=0.01,
         maximum=1e3,
-        origin=assumed("one arm was built; others are of one's own"),
+        origin=_ONE_ARM,
     )
     arm_scatter: Number = parameter(
         0.0,

@@ -21,6 +21,8 @@ from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.terminals import Terminal, TerminalKind, terminal
 from handover.cosim.blocks.units import Metre, Number, PerTick, Radian, Second, SquareMetre, Tick
 
+_CHARACTERISED = assumed("what the sensors were characterised with")
+
 __all__ = ["GraspReflex", "Inputs", "InvalidGraspReflexParameters", "Outputs", "Params", "Source"]
 
 _RESPONSE_MEMORY = 1.5  # s; as the servo's (assumed)
@@ -63,33 +65,11 @@ class Params:
         True, "take in what the fingers read; false: cameras and motors alone", origin=assumed("the scenario's reflex")
     )
     a: Metre = parameter(
-        0.062,
-        "a of the characteristic y = a exp(b x) + c exp(d x)",
-        minimum=1e-6,
-        maximum=1.0,
-        origin=assumed("what the sensors were characterised with"),
+        0.062, "a of the characteristic y = a exp(b x) + c exp(d x)", minimum=1e-6, maximum=1.0, origin=_CHARACTERISED
     )
-    b: PerTick = parameter(
-        -0.0030,
-        "b of the characteristic",
-        minimum=-0.1,
-        maximum=-1e-9,
-        origin=assumed("what the sensors were characterised with"),
-    )
-    c: Metre = parameter(
-        0.022,
-        "c of the characteristic",
-        minimum=1e-6,
-        maximum=1.0,
-        origin=assumed("what the sensors were characterised with"),
-    )
-    d: PerTick = parameter(
-        -0.00043,
-        "d of the characteristic",
-        minimum=-0.1,
-        maximum=-1e-9,
-        origin=assumed("what the sensors were characterised with"),
-    )
+    b: PerTick = parameter(-0.0030, "b of the characteristic", minimum=-0.1, maximum=-1e-9, origin=_CHARACTERISED)
+    c: Metre = parameter(0.022, "c of the characteristic", minimum=1e-6, maximum=1.0, origin=_CHARACTERISED)
+    d: PerTick = parameter(-0.00043, "d of the characteristic", minimum=-0.1, maximum=-1e-9, origin=_CHARACTERISED)
     nearest: Metre = parameter(
         0.004,
         "distance of the largest reading",

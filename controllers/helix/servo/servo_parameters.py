@@ -11,6 +11,8 @@ from handover.cosim.blocks.ports import Vector3, Vector6, Vector9, parameter
 from handover.cosim.blocks.start_values import parameter_faults
 from handover.cosim.blocks.units import Metre, Number, Radian, Second, SquareMetre
 
+_APPENDIX = stated("appendix A")
+
 _ROTATIONS, _LENGTHS = slice(0, None, 2), slice(1, None, 2)  # in q_DL, eq. (8)
 
 
@@ -139,7 +141,7 @@ class Params:
         minimum=0.0,
         origin=assumed("as epsilon_pose_bound"),
     )
-    N_max_iter: int = parameter(20, "iterations of the Jacobian loop at most", minimum=1, origin=stated("appendix A"))
+    N_max_iter: int = parameter(20, "iterations of the Jacobian loop at most", minimum=1, origin=_APPENDIX)
     threshold: Metre = parameter(
         0.05,
         "error at which the arm has reached the place above the ball",
@@ -314,7 +316,7 @@ class Params:
         origin=assumed("own choice: far more than the scenarios' patience of 60 s lets be"),
     )
     P_init: SquareMetre = parameter(
-        2000.0, "variance of all three filters before the first measurement", minimum=0.0, origin=stated("appendix A")
+        2000.0, "variance of all three filters before the first measurement", minimum=0.0, origin=_APPENDIX
     )
     Q_ball: SquareMetre = parameter(
         1e-6,
@@ -323,7 +325,7 @@ class Params:
         origin=assumed("1 mm in a control period: drift of a hand"),
     )
     R_ball: SquareMetre = parameter(
-        0.01, "ball filter: variance of a measurement, without covariances", minimum=0.0, origin=stated("appendix A")
+        0.01, "ball filter: variance of a measurement, without covariances", minimum=0.0, origin=_APPENDIX
     )
     Q_wrist: SquareMetre = parameter(
         4e-5,
@@ -332,7 +334,7 @@ class Params:
         origin=assumed("6 mm in a control period: what J dq leaves unpredicted"),
     )
     R_wrist: SquareMetre = parameter(
-        0.1, "wrist filter: variance of a measurement, without covariances", minimum=0.0, origin=stated("appendix A")
+        0.1, "wrist filter: variance of a measurement, without covariances", minimum=0.0, origin=_APPENDIX
     )
     Q_direction: SquareMetre = parameter(
         4e-5,
@@ -341,10 +343,7 @@ class Params:
         origin=assumed("6 mm in a control period: what J dq leaves unpredicted"),
     )
     R_direction: SquareMetre = parameter(
-        0.01,
-        "gripper direction filter: variance of a measurement, without covariances",
-        minimum=0.0,
-        origin=stated("appendix A"),
+        0.01, "gripper direction filter: variance of a measurement, without covariances", minimum=0.0, origin=_APPENDIX
     )
     use_covariance: bool = parameter(
         True,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from handover.cosim.blocks.block import InvalidParameters
-from handover.cosim.blocks.origins import assumed, derived, stated
+from handover.cosim.blocks.origins import NOT_GIVEN, assumed, derived, stated
 from handover.cosim.blocks.plain_rotation import column, normalize, quaternion, rotation_matrix
 from handover.cosim.blocks.ports import Vector3, Vector4, parameter
 from handover.cosim.blocks.units import (
@@ -87,19 +87,17 @@ class PersonParams:
         StartHolder.FREE, "who has the object at the start", origin=stated("sec. 4.3.1")
     )
     p_WO_0: Vector3[Metre] = parameter(
-        np.array([-0.10, -0.57, 0.0]), "where a free object is at the start", origin=assumed("not given")
+        np.array([-0.10, -0.57, 0.0]), "where a free object is at the start", origin=NOT_GIVEN
     )
     q_WO_0: Vector4[Number] = parameter(
-        np.array([1.0, 0.0, 0.0, 0.0]), "orientation of a free object at the start", origin=assumed("not given")
+        np.array([1.0, 0.0, 0.0, 0.0]), "orientation of a free object at the start", origin=NOT_GIVEN
     )
-    p_WH_0: Vector3[Metre] = parameter(
-        np.array([-0.40, 0.10, -0.05]), "where the hand rests", origin=assumed("not given")
-    )
+    p_WH_0: Vector3[Metre] = parameter(np.array([-0.40, 0.10, -0.05]), "where the hand rests", origin=NOT_GIVEN)
     q_WH_0: Vector4[Number] = parameter(
-        np.array([1.0, 0.0, 0.0, 0.0]), "orientation of the hand where it rests", origin=assumed("not given")
+        np.array([1.0, 0.0, 0.0, 0.0]), "orientation of the hand where it rests", origin=NOT_GIVEN
     )
     arm_reach: Metre = parameter(
-        0.90, "how far from its rest the hand goes", minimum=0.05, maximum=5.0, origin=assumed("not given")
+        0.90, "how far from its rest the hand goes", minimum=0.05, maximum=5.0, origin=NOT_GIVEN
     )
 
     object_mass: Kilogram = parameter(
@@ -124,16 +122,14 @@ class PersonParams:
     )
 
     reaction_time: Second = parameter(
-        0.35, "mean time from seeing to acting", minimum=0.0, maximum=10.0, origin=assumed("not given")
+        0.35, "mean time from seeing to acting", minimum=0.0, maximum=10.0, origin=NOT_GIVEN
     )
-    reaction_spread: Number = parameter(
-        0.15, "its deviation, relative", minimum=0.0, maximum=0.3, origin=assumed("not given")
-    )
+    reaction_spread: Number = parameter(0.15, "its deviation, relative", minimum=0.0, maximum=0.3, origin=NOT_GIVEN)
     reach_speed: MetrePerSecond = parameter(
-        0.40, "highest speed of a reach", minimum=0.01, maximum=3.0, origin=assumed("not given")
+        0.40, "highest speed of a reach", minimum=0.01, maximum=3.0, origin=NOT_GIVEN
     )
     grasp_time: Second = parameter(
-        0.40, "how long the fingers close or open", minimum=0.01, maximum=10.0, origin=assumed("not given")
+        0.40, "how long the fingers close or open", minimum=0.01, maximum=10.0, origin=NOT_GIVEN
     )
     pull_direction: Vector3[Number] = parameter(
         np.array([-0.25, 0.0, 1.0]),
@@ -148,9 +144,9 @@ class PersonParams:
         origin=assumed("not given: that of a hand which nothing resists"),
     )
     pull_ramp: Second = parameter(
-        0.30, "how long its effort takes to rise", minimum=0.01, maximum=10.0, origin=assumed("not given")
+        0.30, "how long its effort takes to rise", minimum=0.01, maximum=10.0, origin=NOT_GIVEN
     )
-    pull_distance: Metre = parameter(0.30, "longest pull", minimum=0.0, maximum=2.0, origin=assumed("not given"))
+    pull_distance: Metre = parameter(0.30, "longest pull", minimum=0.0, maximum=2.0, origin=NOT_GIVEN)
     push_speed: MetrePerSecond = parameter(
         0.15,
         "speed of a push that nothing resists",
@@ -159,10 +155,10 @@ class PersonParams:
         origin=assumed("not given: that of a hand which nothing resists"),
     )
     push_ramp: Second = parameter(
-        0.30, "how long its effort takes to rise", minimum=0.01, maximum=10.0, origin=assumed("not given")
+        0.30, "how long its effort takes to rise", minimum=0.01, maximum=10.0, origin=NOT_GIVEN
     )
     push_distance: Metre = parameter(
-        0.30, "longest push, including the gap to the palm", minimum=0.0, maximum=2.0, origin=assumed("not given")
+        0.30, "longest push, including the gap to the palm", minimum=0.0, maximum=2.0, origin=NOT_GIVEN
     )
     effort: Newton = parameter(
         2.0,
@@ -179,39 +175,39 @@ class PersonParams:
         origin=assumed("not given: more tilts the object in the hand"),
     )
     arm_mass: Kilogram = parameter(
-        1.0, "mass of the arm, as the hand feels it", minimum=0.05, maximum=50.0, origin=assumed("not given")
+        1.0, "mass of the arm, as the hand feels it", minimum=0.05, maximum=50.0, origin=NOT_GIVEN
     )
     offer_gap: Metre = parameter(
-        0.04, "how far before the palm a push begins", minimum=0.0, maximum=0.5, origin=assumed("not given")
+        0.04, "how far before the palm a push begins", minimum=0.0, maximum=0.5, origin=NOT_GIVEN
     )
     patience: Second = parameter(
-        10.0, "how long the person pulls or pushes in vain", minimum=0.1, maximum=1e4, origin=assumed("not given")
+        10.0, "how long the person pulls or pushes in vain", minimum=0.1, maximum=1e4, origin=NOT_GIVEN
     )
 
     arm_stiffness: NewtonPerMetre = parameter(
-        120.0, "stiffness of the arm", minimum=1.0, maximum=5000.0, origin=assumed("not given")
+        120.0, "stiffness of the arm", minimum=1.0, maximum=5000.0, origin=NOT_GIVEN
     )
     arm_damping: NewtonSecondPerMetre = parameter(
-        12.0, "damping of the arm", minimum=0.0, maximum=200.0, origin=assumed("not given")
+        12.0, "damping of the arm", minimum=0.0, maximum=200.0, origin=NOT_GIVEN
     )
     arm_force_max: Newton = parameter(
-        3.0, "force at which the arm yields", minimum=0.1, maximum=200.0, origin=assumed("not given")
+        3.0, "force at which the arm yields", minimum=0.1, maximum=200.0, origin=NOT_GIVEN
     )
     wrist_stiffness: NewtonMetrePerRadian = parameter(
-        2.5, "stiffness of the wrist", minimum=0.01, maximum=200.0, origin=assumed("not given")
+        2.5, "stiffness of the wrist", minimum=0.01, maximum=200.0, origin=NOT_GIVEN
     )
     wrist_damping: NewtonMetreSecondPerRadian = parameter(
-        0.20, "damping of the wrist", minimum=0.0, maximum=10.0, origin=assumed("not given")
+        0.20, "damping of the wrist", minimum=0.0, maximum=10.0, origin=NOT_GIVEN
     )
     wrist_torque_max: NewtonMetre = parameter(
-        0.6, "torque at which the wrist yields", minimum=0.01, maximum=50.0, origin=assumed("not given")
+        0.6, "torque at which the wrist yields", minimum=0.01, maximum=50.0, origin=NOT_GIVEN
     )
     recovery_time: Second = parameter(
-        1.0, "how long an arm takes to recover from yielding", minimum=0.05, maximum=1e6, origin=assumed("not given")
+        1.0, "how long an arm takes to recover from yielding", minimum=0.05, maximum=1e6, origin=NOT_GIVEN
     )
-    fist_radius: Metre = parameter(0.035, "radius of a fist", minimum=0.005, maximum=0.2, origin=assumed("not given"))
+    fist_radius: Metre = parameter(0.035, "radius of a fist", minimum=0.005, maximum=0.2, origin=NOT_GIVEN)
     fist_offset: Metre = parameter(
-        -0.07, "where along y of G a fist pushes", minimum=-0.3, maximum=0.3, origin=assumed("not given")
+        -0.07, "where along y of G a fist pushes", minimum=-0.3, maximum=0.3, origin=NOT_GIVEN
     )
 
 
@@ -220,17 +216,15 @@ class TrackParams(PersonParams):
     """What may lead a hand in place of that person, and how it follows."""
 
     driven_by: Driver = parameter(
-        Driver.PERSON, "who moves the hand: a simulated person, a file, or the inputs", origin=assumed("not given")
+        Driver.PERSON, "who moves the hand: a simulated person, a file, or the inputs", origin=NOT_GIVEN
     )
-    track: str = parameter(
-        "", "CSV file of a recorded track of a hand, of driven_by TRACK", origin=assumed("not given")
-    )
+    track: str = parameter("", "CSV file of a recorded track of a hand, of driven_by TRACK", origin=NOT_GIVEN)
     age_max: Second = parameter(
         0.2,
         "age from which tracking counts as lost; longest gap of a track",
         minimum=0.001,
         maximum=10.0,
-        origin=assumed("not given"),
+        origin=NOT_GIVEN,
     )
     hand_bandwidth: PerSecond = parameter(
         20.0,
@@ -240,23 +234,23 @@ class TrackParams(PersonParams):
         origin=assumed("sec. 4.2.3: the simulated hand follows in less than 0.1 s; here in 0.05 s"),
     )
     hand_speed_max: MetrePerSecond = parameter(
-        2.0, "speed at which it follows", minimum=0.01, maximum=10.0, origin=assumed("not given")
+        2.0, "speed at which it follows", minimum=0.01, maximum=10.0, origin=NOT_GIVEN
     )
     hand_acceleration_max: MetrePerSecond2 = parameter(
-        20.0, "its acceleration", minimum=0.1, maximum=200.0, origin=assumed("not given")
+        20.0, "its acceleration", minimum=0.1, maximum=200.0, origin=NOT_GIVEN
     )
     hand_turning_max: RadianPerSecond = parameter(
-        8.0, "its angular velocity", minimum=0.1, maximum=50.0, origin=assumed("not given")
+        8.0, "its angular velocity", minimum=0.1, maximum=50.0, origin=NOT_GIVEN
     )
     hand_turning_acceleration_max: RadianPerSecond2 = parameter(
-        80.0, "its angular acceleration", minimum=1.0, maximum=1000.0, origin=assumed("not given")
+        80.0, "its angular acceleration", minimum=1.0, maximum=1000.0, origin=NOT_GIVEN
     )
     finger_force: Newton = parameter(
         0.1,
         "force of a phalanx whose joint wants on, if the hand follows a track",
         minimum=0.0,
         maximum=20.0,
-        origin=assumed("not given"),
+        origin=NOT_GIVEN,
     )
 
 
@@ -265,56 +259,52 @@ class ContactParams(PersonParams):
     """Fingers, the gripper's hold, and a person's errors and tremor: all that does not depend on who leads a hand."""
 
     finger_rate: RadianPerSecond = parameter(
-        12.0, "speed of the hand's joints", minimum=0.1, maximum=100.0, origin=assumed("not given")
+        12.0, "speed of the hand's joints", minimum=0.1, maximum=100.0, origin=NOT_GIVEN
     )
     finger_stiffness: NewtonPerMetre = parameter(
-        300.0, "stiffness of a phalanx", minimum=1.0, maximum=1e5, origin=assumed("not given")
+        300.0, "stiffness of a phalanx", minimum=1.0, maximum=1e5, origin=NOT_GIVEN
     )
     finger_damping: NewtonSecondPerMetre = parameter(
-        3.0, "damping of a phalanx", minimum=0.0, maximum=1000.0, origin=assumed("not given")
+        3.0, "damping of a phalanx", minimum=0.0, maximum=1000.0, origin=NOT_GIVEN
     )
 
     grip_stiffness: NewtonPerMetre = parameter(
-        800.0, "stiffness of the grip", minimum=1.0, maximum=1e5, origin=assumed("not given")
+        800.0, "stiffness of the grip", minimum=1.0, maximum=1e5, origin=NOT_GIVEN
     )
     grip_damping: NewtonSecondPerMetre = parameter(
-        8.0, "damping of the grip", minimum=0.0, maximum=1000.0, origin=assumed("not given")
+        8.0, "damping of the grip", minimum=0.0, maximum=1000.0, origin=NOT_GIVEN
     )
     grip_force_max: Newton = parameter(
-        5.0, "force at which the object slides", minimum=0.01, maximum=1000.0, origin=assumed("not given")
+        5.0, "force at which the object slides", minimum=0.01, maximum=1000.0, origin=NOT_GIVEN
     )
     grip_turn_stiffness: NewtonMetrePerRadian = parameter(
-        4.0, "its turning stiffness", minimum=0.01, maximum=1e4, origin=assumed("not given")
+        4.0, "its turning stiffness", minimum=0.01, maximum=1e4, origin=NOT_GIVEN
     )
     grip_turn_damping: NewtonMetreSecondPerRadian = parameter(
-        0.04, "its turning damping", minimum=0.0, maximum=100.0, origin=assumed("not given")
+        0.04, "its turning damping", minimum=0.0, maximum=100.0, origin=NOT_GIVEN
     )
     grip_torque_max: NewtonMetre = parameter(
-        0.4, "torque at which it turns in the grip", minimum=0.001, maximum=100.0, origin=assumed("not given")
+        0.4, "torque at which it turns in the grip", minimum=0.001, maximum=100.0, origin=NOT_GIVEN
     )
     centring_time: Second = parameter(
-        0.5, "how long the grip takes to centre", minimum=0.01, maximum=100.0, origin=assumed("not given")
+        0.5, "how long the grip takes to centre", minimum=0.01, maximum=100.0, origin=NOT_GIVEN
     )
     palm_stiffness: NewtonPerMetre = parameter(
-        600.0, "stiffness of the palm", minimum=1.0, maximum=1e5, origin=assumed("not given")
+        600.0, "stiffness of the palm", minimum=1.0, maximum=1e5, origin=NOT_GIVEN
     )
     palm_damping: NewtonSecondPerMetre = parameter(
-        6.0, "damping of the palm", minimum=0.0, maximum=1000.0, origin=assumed("not given")
+        6.0, "damping of the palm", minimum=0.0, maximum=1000.0, origin=NOT_GIVEN
     )
-    palm_depth: Metre = parameter(
-        0.03, "how far the palm lies behind G", minimum=0.001, maximum=0.5, origin=assumed("not given")
-    )
-    palm_width: Metre = parameter(
-        0.04, "half the width of the palm", minimum=0.001, maximum=0.5, origin=assumed("not given")
-    )
+    palm_depth: Metre = parameter(0.03, "how far the palm lies behind G", minimum=0.001, maximum=0.5, origin=NOT_GIVEN)
+    palm_width: Metre = parameter(0.04, "half the width of the palm", minimum=0.001, maximum=0.5, origin=NOT_GIVEN)
     capture_axial: Metre = parameter(
-        0.03, "how far along x of G the fingers reach", minimum=0.001, maximum=0.2, origin=assumed("not given")
+        0.03, "how far along x of G the fingers reach", minimum=0.001, maximum=0.2, origin=NOT_GIVEN
     )
     capture_lateral: Metre = parameter(
-        0.02, "how far along z of G they reach", minimum=0.001, maximum=0.2, origin=assumed("not given")
+        0.02, "how far along z of G they reach", minimum=0.001, maximum=0.2, origin=NOT_GIVEN
     )
     capture_end: Metre = parameter(
-        0.01, "how far beyond an object's end G may be", minimum=0.0, maximum=0.1, origin=assumed("not given")
+        0.01, "how far beyond an object's end G may be", minimum=0.0, maximum=0.1, origin=NOT_GIVEN
     )
     angle_open: Radian = parameter(
         1.20, "angle of the open gripper", minimum=0.0, maximum=3.0, origin=assumed("above beta, sec. 4.1.2")
@@ -334,14 +324,10 @@ class ContactParams(PersonParams):
         origin=assumed("open, for trying the unit; the handovers begin with handover_place.angle_0"),
     )
     aperture: Metre = parameter(
-        0.055, "thickness that the open gripper just takes", minimum=0.001, maximum=0.5, origin=assumed("not given")
+        0.055, "thickness that the open gripper just takes", minimum=0.001, maximum=0.5, origin=NOT_GIVEN
     )
     release_angle: Radian = parameter(
-        0.20,
-        "how far the fingers open before the object comes free",
-        minimum=0.0,
-        maximum=3.0,
-        origin=assumed("not given"),
+        0.20, "how far the fingers open before the object comes free", minimum=0.0, maximum=3.0, origin=NOT_GIVEN
     )
     grip_fades: bool = parameter(
         False,
@@ -349,7 +335,7 @@ class ContactParams(PersonParams):
         origin=assumed("not given: the grip is as firm as ever until it lets go"),
     )
     gripper_rate: RadianPerSecond = parameter(
-        0.6, "speed of the gripper's angle", minimum=0.01, maximum=100.0, origin=assumed("not given")
+        0.6, "speed of the gripper's angle", minimum=0.01, maximum=100.0, origin=NOT_GIVEN
     )
 
     line_of_sight: Vector3[Number] = parameter(
@@ -382,7 +368,7 @@ class ContactParams(PersonParams):
         origin=assumed("not given: of a skilled person"),
     )
     effort_spread: Number = parameter(
-        0.05, "deviation of the effort, relative", minimum=0.0, maximum=0.5, origin=assumed("not given")
+        0.05, "deviation of the effort, relative", minimum=0.0, maximum=0.5, origin=NOT_GIVEN
     )
     haste: Number = parameter(
         0.0,
@@ -399,31 +385,21 @@ class ContactParams(PersonParams):
         origin=assumed("not given: half a finger's length"),
     )
     palm_back: Metre = parameter(
-        0.03,
-        "how far the palm of the hand lies behind its middle",
-        minimum=0.001,
-        maximum=0.2,
-        origin=assumed("not given"),
+        0.03, "how far the palm of the hand lies behind its middle", minimum=0.001, maximum=0.2, origin=NOT_GIVEN
     )
-    attempts: int = parameter(
-        3, "how often the person tries at a signal", minimum=1, maximum=100, origin=assumed("not given")
-    )
+    attempts: int = parameter(3, "how often the person tries at a signal", minimum=1, maximum=100, origin=NOT_GIVEN)
 
     tremor_rms: Metre = parameter(
-        0.0005, "root mean square length of the tremor", minimum=0.0, maximum=0.05, origin=assumed("not given")
+        0.0005, "root mean square length of the tremor", minimum=0.0, maximum=0.05, origin=NOT_GIVEN
     )
-    tremor_frequency: Hertz = parameter(
-        8.0, "middle of the tremor's band", minimum=0.1, maximum=50.0, origin=assumed("not given")
-    )
+    tremor_frequency: Hertz = parameter(8.0, "middle of the tremor's band", minimum=0.1, maximum=50.0, origin=NOT_GIVEN)
     tremor_bandwidth: Hertz = parameter(
-        2.0, "width of the tremor's band at half power", minimum=0.01, maximum=50.0, origin=assumed("not given")
+        2.0, "width of the tremor's band at half power", minimum=0.01, maximum=50.0, origin=NOT_GIVEN
     )
     drift_rms: Metre = parameter(
-        0.002, "root mean square length of the drift", minimum=0.0, maximum=0.1, origin=assumed("not given")
+        0.002, "root mean square length of the drift", minimum=0.0, maximum=0.1, origin=NOT_GIVEN
     )
-    drift_time: Second = parameter(
-        5.0, "correlation time of the drift", minimum=0.1, maximum=1000.0, origin=assumed("not given")
-    )
+    drift_time: Second = parameter(5.0, "correlation time of the drift", minimum=0.1, maximum=1000.0, origin=NOT_GIVEN)
     substep: Second = parameter(
         0.016, "longest step of the integration", minimum=1e-5, maximum=0.1, origin=assumed("numerical")
     )

@@ -34,6 +34,8 @@ from handover.plants.free_flyer.hand.box import Box
 from handover.plants.free_flyer.hand.hand_kinematics import RADIUS
 from handover.plants.free_flyer.hand.parameters import MIN_ROOM, ContactParams, StartHolder
 
+_PROPOSED = assumed("sec. 6.3 proposes two robots with a larger object, and gives no values")
+
 
 class InvalidLargeObjectParameters(InvalidParameters):
     """Parameters, or a start, that contradict each other; `faults` lists all of them."""
@@ -52,42 +54,32 @@ class Params(ContactParams):
     """
 
     p_WO_0: Vector3[Metre] = parameter(
-        np.array([0.10, -0.80, 0.0]),
-        "where a free object is at the start",
-        origin=assumed("sec. 6.3 proposes two robots with a larger object, and gives no values"),
+        np.array([0.10, -0.80, 0.0]), "where a free object is at the start", origin=_PROPOSED
     )
     p_WH_0: Vector3[Metre] = parameter(
-        np.array([-0.65, 0.0, -0.05]),
-        "where the middle between the hands rests",
-        origin=assumed("sec. 6.3 proposes two robots with a larger object, and gives no values"),
+        np.array([-0.65, 0.0, -0.05]), "where the middle between the hands rests", origin=_PROPOSED
     )
-    object_mass: Kilogram = parameter(
-        3.0,
-        "mass of the object",
-        minimum=0.001,
-        maximum=100.0,
-        origin=assumed("sec. 6.3 proposes two robots with a larger object, and gives no values"),
-    )
+    object_mass: Kilogram = parameter(3.0, "mass of the object", minimum=0.001, maximum=100.0, origin=_PROPOSED)
     object_size: Vector3[Metre] = parameter(
         np.array([0.40, 0.70, 0.05]),
         "sides of the object, a box, without its handles",
         minimum=0.001,
         maximum=2.0,
-        origin=assumed("sec. 6.3 proposes two robots with a larger object, and gives no values"),
+        origin=_PROPOSED,
     )
     p_OG: Vector3[Metre] = parameter(
         np.array([0.28, 0.0, 0.0]),
         "middle between the handles for the grippers",
         minimum=-2.0,
         maximum=2.0,
-        origin=assumed("sec. 6.3 proposes two robots with a larger object, and gives no values"),
+        origin=_PROPOSED,
     )
     p_OH: Vector3[Metre] = parameter(
         np.array([-0.28, 0.0, 0.0]),
         "middle between the hands' handles, or the one hand's",
         minimum=-2.0,
         maximum=2.0,
-        origin=assumed("sec. 6.3 proposes two robots with a larger object, and gives no values"),
+        origin=_PROPOSED,
     )
     pull_direction: Vector3[Number] = parameter(
         np.array([-1.0, 0.0, 0.0]),
@@ -131,11 +123,7 @@ class Params(ContactParams):
         origin=assumed("the section of person.object_size, which gripper and hand are made for"),
     )
     grip_spacing: Metre = parameter(
-        0.50,
-        "between the grippers' handles, along y; the first is at +y",
-        minimum=0.0,
-        maximum=2.0,
-        origin=assumed("sec. 6.3 proposes two robots with a larger object, and gives no values"),
+        0.50, "between the grippers' handles, along y; the first is at +y", minimum=0.0, maximum=2.0, origin=_PROPOSED
     )
     hands: int = parameter(
         2, "how many hands the person uses", minimum=1, maximum=2, origin=derived("sec. 6.3: both hands")
@@ -152,7 +140,7 @@ class Params(ContactParams):
         "how much later than the first the second hand closes and opens",
         minimum=0.0,
         maximum=10.0,
-        origin=assumed("sec. 6.3 proposes two robots with a larger object, and gives no values"),
+        origin=_PROPOSED,
     )
 
     @property

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handover.cosim.blocks.origins import assumed, derived, stated
+from handover.cosim.blocks.origins import NOT_GIVEN, assumed, derived, stated
 from handover.cosim.blocks.ports import Floats, Matrix3, Vector3, parameter
 from handover.cosim.blocks.units import (
     Kilogram,
@@ -111,10 +111,10 @@ class ArmParameters:
         origin=derived("Astrobee's description of its perching arm; a third joint the same"),
     )
     friction_J: Vector3[NewtonMetre] = parameter(
-        np.zeros(3), "dry friction of the joints", minimum=0.0, maximum=1000.0, origin=assumed("not given")
+        np.zeros(3), "dry friction of the joints", minimum=0.0, maximum=1000.0, origin=NOT_GIVEN
     )
     drag_J: Vector3[NewtonMetreSecondPerRadian] = parameter(
-        np.zeros(3), "viscous friction of the joints", minimum=0.0, maximum=1000.0, origin=assumed("not given")
+        np.zeros(3), "viscous friction of the joints", minimum=0.0, maximum=1000.0, origin=NOT_GIVEN
     )
     lock_time: Second = parameter(
         NEVER, "when the joints lock where they are", minimum=0.0, maximum=NEVER, origin=assumed("never")

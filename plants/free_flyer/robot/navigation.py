@@ -9,7 +9,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from handover.cosim.blocks.block import InvalidParameters
-from handover.cosim.blocks.origins import assumed, derived
+from handover.cosim.blocks.origins import NOT_GIVEN, assumed, derived
 from handover.cosim.blocks.plain_rotation import (
     IDENTITY,
     ZERO,
@@ -27,6 +27,9 @@ from handover.cosim.blocks.start_values import parameter_faults
 from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.terminals import Terminal, TerminalKind, terminal
 from handover.cosim.blocks.units import Hertz, Metre, MetrePerSecond, Number, Radian, RadianPerSecond, Second
+
+_WHITE = assumed("not given: white noise of the navigation's estimate")
+_NONE = assumed("not given: none")
 
 _ROUNDING = 1e-6
 """Part of an update's interval by which a host's time may be off."""
@@ -57,76 +60,44 @@ class Params:
     """
 
     position_noise: Metre = parameter(
-        0.001,
-        "deviation of the estimated position, white",
-        minimum=0.0,
-        maximum=1.0,
-        origin=assumed("not given: white noise of the navigation's estimate"),
+        0.001, "deviation of the estimated position, white", minimum=0.0, maximum=1.0, origin=_WHITE
     )
     attitude_noise: Radian = parameter(
-        0.002,
-        "deviation of the estimated attitude, white",
-        minimum=0.0,
-        maximum=0.5,
-        origin=assumed("not given: white noise of the navigation's estimate"),
+        0.002, "deviation of the estimated attitude, white", minimum=0.0, maximum=0.5, origin=_WHITE
     )
     velocity_noise: MetrePerSecond = parameter(
-        0.001,
-        "deviation of the estimated velocity, white",
-        minimum=0.0,
-        maximum=1.0,
-        origin=assumed("not given: white noise of the navigation's estimate"),
+        0.001, "deviation of the estimated velocity, white", minimum=0.0, maximum=1.0, origin=_WHITE
     )
     rate_noise: RadianPerSecond = parameter(
-        0.002,
-        "deviation of the estimated angular velocity, white",
-        minimum=0.0,
-        maximum=1.0,
-        origin=assumed("not given: white noise of the navigation's estimate"),
+        0.002, "deviation of the estimated angular velocity, white", minimum=0.0, maximum=1.0, origin=_WHITE
     )
     position_bias: Metre = parameter(
-        0.0,
-        "deviation of the estimated position, the same for a whole run",
-        minimum=0.0,
-        maximum=1.0,
-        origin=assumed("not given: none"),
+        0.0, "deviation of the estimated position, the same for a whole run", minimum=0.0, maximum=1.0, origin=_NONE
     )
     attitude_bias: Radian = parameter(
-        0.0,
-        "deviation of the estimated attitude, the same for a whole run",
-        minimum=0.0,
-        maximum=0.5,
-        origin=assumed("not given: none"),
+        0.0, "deviation of the estimated attitude, the same for a whole run", minimum=0.0, maximum=0.5, origin=_NONE
     )
     velocity_bias: MetrePerSecond = parameter(
-        0.0,
-        "deviation of the estimated velocity, the same for a whole run",
-        minimum=0.0,
-        maximum=1.0,
-        origin=assumed("not given: none"),
+        0.0, "deviation of the estimated velocity, the same for a whole run", minimum=0.0, maximum=1.0, origin=_NONE
     )
     rate_bias: RadianPerSecond = parameter(
         0.0,
         "deviation of the estimated angular velocity, the same for a whole run",
         minimum=0.0,
         maximum=1.0,
-        origin=assumed("not given: none"),
+        origin=_NONE,
     )
     position_drift: Metre = parameter(
-        0.0, "deviation of the estimated position, slow", minimum=0.0, maximum=1.0, origin=assumed("not given: none")
+        0.0, "deviation of the estimated position, slow", minimum=0.0, maximum=1.0, origin=_NONE
     )
     attitude_drift: Radian = parameter(
-        0.0, "deviation of the estimated attitude, slow", minimum=0.0, maximum=0.5, origin=assumed("not given: none")
+        0.0, "deviation of the estimated attitude, slow", minimum=0.0, maximum=0.5, origin=_NONE
     )
     velocity_drift: MetrePerSecond = parameter(
-        0.0, "deviation of the estimated velocity, slow", minimum=0.0, maximum=1.0, origin=assumed("not given: none")
+        0.0, "deviation of the estimated velocity, slow", minimum=0.0, maximum=1.0, origin=_NONE
     )
     rate_drift: RadianPerSecond = parameter(
-        0.0,
-        "deviation of the estimated angular velocity, slow",
-        minimum=0.0,
-        maximum=1.0,
-        origin=assumed("not given: none"),
+        0.0, "deviation of the estimated angular velocity, slow", minimum=0.0, maximum=1.0, origin=_NONE
     )
     drift_time: Second = parameter(
         0.0,
@@ -142,7 +113,7 @@ class Params:
         maximum=1e4,
         origin=derived("not given: an estimate for every cycle, as sec. 4.1.2 calls the impedance control at each"),
     )
-    delay: Second = parameter(0.0, "age of what is estimated", minimum=0.0, maximum=2.0, origin=assumed("not given"))
+    delay: Second = parameter(0.0, "age of what is estimated", minimum=0.0, maximum=2.0, origin=NOT_GIVEN)
     seed: int = parameter(0, "seed of the random numbers", minimum=0)
 
     def check(self) -> None:

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from handover.cosim.blocks.origins import assumed, stated
+from handover.cosim.blocks.origins import NOT_GIVEN, assumed, stated
 from handover.cosim.blocks.ports import Floats, Vector3, output, parameter
 from handover.cosim.blocks.terminals import Terminal, TerminalKind, terminal
 from handover.cosim.blocks.units import Newton, NewtonMetre, Second
@@ -39,7 +39,7 @@ class Params:
         maximum=1000.0,
         origin=stated("figs. 4.5-4.7: no torque with a force; the scenario's 3 N m are in push_scenario"),
     )
-    start: Second = parameter(1.0, "when the push begins", minimum=0.0, maximum=1e6, origin=assumed("not given"))
+    start: Second = parameter(1.0, "when the push begins", minimum=0.0, maximum=1e6, origin=NOT_GIVEN)
     duration: Second = parameter(
         0.5, "how long it lasts", minimum=0.0, maximum=1e6, origin=assumed("not given in the text")
     )

@@ -11,7 +11,7 @@ from typing import ClassVar
 import numpy as np
 
 from handover.cosim.blocks.block import InvalidParameters
-from handover.cosim.blocks.origins import assumed, derived, stated
+from handover.cosim.blocks.origins import NOT_GIVEN, assumed, derived, stated
 from handover.cosim.blocks.ports import Floats, Vector2, Vector3, Vector12, output, parameter, port
 from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.terminals import Terminal, TerminalKind, terminal
@@ -61,12 +61,8 @@ class Params:
         maximum=1000.0,
         origin=stated("Astrobee, about"),
     )
-    lag: Second = parameter(
-        0.02, "time constant of the first-order lag", minimum=0.0, maximum=10.0, origin=assumed("not given")
-    )
-    delay: Second = parameter(
-        0.0, "how long a command takes to arrive", minimum=0.0, maximum=10.0, origin=assumed("not given")
-    )
+    lag: Second = parameter(0.02, "time constant of the first-order lag", minimum=0.0, maximum=10.0, origin=NOT_GIVEN)
+    delay: Second = parameter(0.0, "how long a command takes to arrive", minimum=0.0, maximum=10.0, origin=NOT_GIVEN)
     propulsion: Propulsion = parameter(
         Propulsion.LIMITED,
         "without limits or lag, with both, or by nozzles; all delay",

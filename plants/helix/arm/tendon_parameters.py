@@ -22,6 +22,11 @@ from handover.cosim.blocks.units import (
     Second,
 )
 
+_FITTED = assumed(
+    "such that at rest, for one commanded state far forward, model and arm are 0.29, 0.16 and "
+    "0.14 m apart, as in sec. 5.2; in the closed loop they end 0.08 m apart: see fitted_arm"
+)
+
 
 class InvalidArmParameters(InvalidParameters):
     """Values of which no arm can be built; `faults` lists all of them, `block` is which of the two arms."""
@@ -61,10 +66,7 @@ class Params:
         "lengths of the segments without tendons and weight: the excess tightens the tendons",
         minimum=0.01,
         maximum=2.0,
-        origin=assumed(
-            "such that at rest, for one commanded state far forward, model and arm are 0.29, 0.16 and "
-            "0.14 m apart, as in sec. 5.2; in the closed loop they end 0.08 m apart: see fitted_arm"
-        ),
+        origin=_FITTED,
     )
     d_gripper: Metre = parameter(
         0.10, "distance of wrist and gripper", minimum=0.0, maximum=1.0, origin=stated("sec. 3.2.4, appendix A")
@@ -76,26 +78,8 @@ class Params:
         maximum=0.5,
         origin=assumed("as the controller has it"),
     )
-    EA: Newton = parameter(
-        100.0,
-        "axial stiffness of the segments",
-        minimum=1.0,
-        maximum=1e5,
-        origin=assumed(
-            "such that at rest, for one commanded state far forward, model and arm are 0.29, 0.16 and "
-            "0.14 m apart, as in sec. 5.2; in the closed loop they end 0.08 m apart: see fitted_arm"
-        ),
-    )
-    EI: NewtonMetre2 = parameter(
-        0.0267,
-        "bending stiffness of the segments",
-        minimum=1e-4,
-        maximum=1e2,
-        origin=assumed(
-            "such that at rest, for one commanded state far forward, model and arm are 0.29, 0.16 and "
-            "0.14 m apart, as in sec. 5.2; in the closed loop they end 0.08 m apart: see fitted_arm"
-        ),
-    )
+    EA: Newton = parameter(100.0, "axial stiffness of the segments", minimum=1.0, maximum=1e5, origin=_FITTED)
+    EI: NewtonMetre2 = parameter(0.0267, "bending stiffness of the segments", minimum=1e-4, maximum=1e2, origin=_FITTED)
     shear_ratio: Number = parameter(
         0.35, "shear stiffness over axial stiffness, GA / EA", minimum=0.01, maximum=10.0, origin=assumed("GA / EA")
     )
@@ -114,20 +98,14 @@ class Params:
         "masses of the segments, spread over their lengths",
         minimum=0.001,
         maximum=10.0,
-        origin=assumed(
-            "such that at rest, for one commanded state far forward, model and arm are 0.29, 0.16 and "
-            "0.14 m apart, as in sec. 5.2; in the closed loop they end 0.08 m apart: see fitted_arm"
-        ),
+        origin=_FITTED,
     )
     plate_mass: Vector3[Kilogram] = parameter(
         np.array([0.03, 0.03, 0.05]),
         "masses of the plates that end the segments",
         minimum=0.0,
         maximum=10.0,
-        origin=assumed(
-            "such that at rest, for one commanded state far forward, model and arm are 0.29, 0.16 and "
-            "0.14 m apart, as in sec. 5.2; in the closed loop they end 0.08 m apart: see fitted_arm"
-        ),
+        origin=_FITTED,
     )
     shortest: Number = parameter(
         0.4,
@@ -143,16 +121,7 @@ class Params:
         maximum=10.0,
         origin=assumed("own choice: tendons within eq. (11) are 1.4 times as long as calibrated, or shorter"),
     )
-    gripper_mass: Kilogram = parameter(
-        0.10,
-        "mass of the gripper",
-        minimum=0.0,
-        maximum=10.0,
-        origin=assumed(
-            "such that at rest, for one commanded state far forward, model and arm are 0.29, 0.16 and "
-            "0.14 m apart, as in sec. 5.2; in the closed loop they end 0.08 m apart: see fitted_arm"
-        ),
-    )
+    gripper_mass: Kilogram = parameter(0.10, "mass of the gripper", minimum=0.0, maximum=10.0, origin=_FITTED)
     gravity: MetrePerSecond2 = parameter(
         9.81, "gravity, along -z of the world", minimum=0.0, maximum=30.0, origin=assumed("standard")
     )

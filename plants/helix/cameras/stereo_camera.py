@@ -33,6 +33,15 @@ from handover.plants.helix.cameras.scene import HandoverScene, MarkerCollar
 from handover.plants.helix.cameras.shapes import Decal, Pixels, PolygonLayer
 from handover.plants.helix.hand.bowl import Bowl
 
+_AIMED = assumed("point in W that all cameras look at")
+_INTRINSICS = assumed(
+    "f_x, f_y, c_x, c_y of left, right and third camera: focal lengths from the 78 degrees of "
+    "diagonal field of view that the Logitech Brio of sec. 3.2.1 has at 1280x720; principal "
+    "points some px off the middle, as real ones are"
+)
+_DISTORTION = assumed("k_1, k_2, p_1, p_2, k_3 of left, right and third camera; a webcam's size of distortion")
+_UNCOVERED = derived("undisturbed: no lens is covered")
+
 _OFFSETS = 1 << 20  # places in the sheet of noise where a picture's part may begin
 
 
@@ -118,40 +127,32 @@ class Params:
     q_WC_left: Vector4[Number] = parameter(
         quaternion_of(looking_at(_P_WC_LEFT, _LOOKED_AT)),
         "orientation of the left camera in the world",
-        origin=assumed("point in W that all cameras look at"),
+        origin=_AIMED,
     )
     q_WC_right: Vector4[Number] = parameter(
         quaternion_of(looking_at(_P_WC_RIGHT, _LOOKED_AT)),
         "orientation of the right camera in the world",
-        origin=assumed("point in W that all cameras look at"),
+        origin=_AIMED,
     )
     intrinsics_left: Vector4[Pixel] = parameter(
         np.array([907.0, 906.0, 642.5, 357.0]),
         "left camera's focal lengths and principal point: fx, fy, cx, cy",
-        origin=assumed(
-            "f_x, f_y, c_x, c_y of left, right and third camera: focal lengths from the 78 degrees of "
-            "diagonal field of view that the Logitech Brio of sec. 3.2.1 has at 1280x720; principal "
-            "points some px off the middle, as real ones are"
-        ),
+        origin=_INTRINSICS,
     )
     intrinsics_right: Vector4[Pixel] = parameter(
         np.array([908.5, 907.5, 636.0, 361.5]),
         "right camera's focal lengths and principal point: fx, fy, cx, cy",
-        origin=assumed(
-            "f_x, f_y, c_x, c_y of left, right and third camera: focal lengths from the 78 degrees of "
-            "diagonal field of view that the Logitech Brio of sec. 3.2.1 has at 1280x720; principal "
-            "points some px off the middle, as real ones are"
-        ),
+        origin=_INTRINSICS,
     )
     distortion_left: Vector5[Number] = parameter(
         np.array([0.105, -0.190, 0.0006, -0.0008, 0.060]),
         "left lens's distortion: k1, k2, p1, p2, k3",
-        origin=assumed("k_1, k_2, p_1, p_2, k_3 of left, right and third camera; a webcam's size of distortion"),
+        origin=_DISTORTION,
     )
     distortion_right: Vector5[Number] = parameter(
         np.array([0.092, -0.165, -0.0005, 0.0007, 0.045]),
         "right lens's distortion: k1, k2, p1, p2, k3",
-        origin=assumed("k_1, k_2, p_1, p_2, k_3 of left, right and third camera; a webcam's size of distortion"),
+        origin=_DISTORTION,
     )
     has_third: bool = parameter(
         False, "whether there is a third camera; its picture is black without", origin=stated("sec. 3.2.1: two cameras")
@@ -167,21 +168,17 @@ class Params:
     q_WC_third: Vector4[Number] = parameter(
         quaternion_of(looking_at(_P_WC_THIRD, _LOOKED_AT)),
         "orientation of the third camera in the world",
-        origin=assumed("point in W that all cameras look at"),
+        origin=_AIMED,
     )
     intrinsics_third: Vector4[Pixel] = parameter(
         np.array([906.0, 905.5, 639.0, 358.5]),
         "third camera's focal lengths and principal point: fx, fy, cx, cy",
-        origin=assumed(
-            "f_x, f_y, c_x, c_y of left, right and third camera: focal lengths from the 78 degrees of "
-            "diagonal field of view that the Logitech Brio of sec. 3.2.1 has at 1280x720; principal "
-            "points some px off the middle, as real ones are"
-        ),
+        origin=_INTRINSICS,
     )
     distortion_third: Vector5[Number] = parameter(
         np.array([0.098, -0.178, 0.0002, 0.0004, 0.052]),
         "third lens's distortion: k1, k2, p1, p2, k3",
-        origin=assumed("k_1, k_2, p_1, p_2, k_3 of left, right and third camera; a webcam's size of distortion"),
+        origin=_DISTORTION,
     )
     arm_radius: Metre = parameter(
         0.030,
@@ -233,25 +230,16 @@ class Params:
         origin=assumed("own choice: a room is not lit evenly"),
     )
     cover_left_from: Second = parameter(
-        0.0,
-        "time at which a cloth covers the left lens",
-        minimum=0.0,
-        origin=derived("undisturbed: no lens is covered"),
+        0.0, "time at which a cloth covers the left lens", minimum=0.0, origin=_UNCOVERED
     )
     cover_left_until: Second = parameter(
-        0.0, "time at which the left lens is free again", minimum=0.0, origin=derived("undisturbed: no lens is covered")
+        0.0, "time at which the left lens is free again", minimum=0.0, origin=_UNCOVERED
     )
     cover_right_from: Second = parameter(
-        0.0,
-        "time at which a cloth covers the right lens",
-        minimum=0.0,
-        origin=derived("undisturbed: no lens is covered"),
+        0.0, "time at which a cloth covers the right lens", minimum=0.0, origin=_UNCOVERED
     )
     cover_right_until: Second = parameter(
-        0.0,
-        "time at which the right lens is free again",
-        minimum=0.0,
-        origin=derived("undisturbed: no lens is covered"),
+        0.0, "time at which the right lens is free again", minimum=0.0, origin=_UNCOVERED
     )
     light: Number = parameter(
         1.0,
@@ -295,7 +283,7 @@ class Params:
         "distance of gripper and ball from which on, once it came so near, cloths cover all lenses; 0: never",
         minimum=0.0,
         maximum=1.0,
-        origin=derived("undisturbed: no lens is covered"),
+        origin=_UNCOVERED,
     )
     hide_ball_within: Metre = parameter(
         0.0,

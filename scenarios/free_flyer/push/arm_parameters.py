@@ -9,7 +9,7 @@ from handover.controllers.free_flyer.arm_impedance_controller import Params as C
 from handover.controllers.free_flyer.arm_model import ArmModel, Chain
 from handover.controllers.free_flyer.gains import ImpedanceGains
 from handover.controllers.free_flyer.ports import Behaviour as ControllerBehaviour
-from handover.cosim.blocks.origins import assumed, stated
+from handover.cosim.blocks.origins import NOT_GIVEN, assumed, stated
 from handover.cosim.blocks.ports import Floats, Vector3, parameter
 from handover.cosim.blocks.units import NewtonMetre, NewtonMetreSecondPerRadian, Number, Radian, Second
 from handover.scenarios.experiment.paper import paper_values
@@ -67,9 +67,7 @@ class ArmPushParameters(ImpedanceParameters):
         maximum=20.0,
         origin=assumed("table 4.1, compliant; the rigid setting's 5 is unstable with joints at 62.5 Hz"),
     )
-    friction: NewtonMetre = parameter(
-        0.0, "dry friction of the joints", minimum=0.0, maximum=1.0, origin=assumed("not given")
-    )
+    friction: NewtonMetre = parameter(0.0, "dry friction of the joints", minimum=0.0, maximum=1.0, origin=NOT_GIVEN)
     lock_time: Second = parameter(
         1e6, "when the joints lock where they are", minimum=0.0, maximum=1e6, origin=assumed("never")
     )
