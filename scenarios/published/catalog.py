@@ -22,8 +22,8 @@ from handover.scenarios.published.ir_grasp.ir_limits import IrLimits
 from handover.scenarios.published.ir_grasp.ir_sensor import IrSensorCurve
 from handover.scenarios.published.ir_grasp.ir_table import IrTable
 from handover.scenarios.published.published_experiment import PublishedExperiment
-from handover.scenarios.published.vsl.vsl_1.experiment import Vsl1
-from handover.scenarios.published.vsl.vsl_2.experiment import Vsl2
+from handover.scenarios.published.vsl.vsl_1 import Vsl1
+from handover.scenarios.published.vsl.vsl_2 import Vsl2
 
 _ALL: tuple[type[PublishedExperiment], ...] = (
     FlyerApproaches,

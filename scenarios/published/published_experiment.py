@@ -164,6 +164,10 @@ class PublishedExperiment(abc.ABC):
     def plan(self, quick: bool) -> CampaignPlan:
         """Return the runs that it needs, with its usual seed; if `quick`, a fraction of them."""
 
+    def campaign(self, points: Sequence[Mapping[str, str]], **others: Any) -> CampaignPlan:
+        """Return a plan of points; the others are those of `CampaignPlan`."""
+        return CampaignPlan(scenario=self.scenario, points=points, experiment=self.name, **others)
+
     @abc.abstractmethod
     def claims(self, table: CampaignTable) -> Sequence[Claim]:
         """Return the paper's claims with their verdicts, those beyond the paper last."""

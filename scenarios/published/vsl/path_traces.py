@@ -3,13 +3,25 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from handover.controllers.vsl.hybrid_kinematics import Params as KinematicsParams
 from handover.controllers.vsl.kinematics import VslKinematics
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
+from handover.scenarios.published.figures import SOFT, Mark
+from handover.scenarios.published.runs import Row, is_done
+
+EQUAL: Any = {"aspect": "equal", "adjustable": "datalim"}
+"""Of a panel whose axes have one scale."""
+
+
+def has_completed_path(row: Row) -> bool:
+    """Return whether a run came to the end of its path, however far off it was."""
+    return is_done(row) and row.get("path_time") is not None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,3 +110,32 @@ class Repetitions:
         spread = np.sqrt(np.sum(np.var(positions, axis=0, ddof=min(1, len(traces) - 1)), axis=1))
         errors = np.linalg.norm(positions - desired, axis=2)
         return cls(desired, positions.mean(axis=0), spread, errors)
+
+
+@dataclass(frozen=True)
+class PathBand:
+    """The mean of repetitions in the plane XZ, mm, with their deviation as a band across the path."""
+
+    curve: Repetitions
+    colour: str
+    label: str
+
+    def draw(self, axes: Axes) -> None:
+        """Draw it."""
+        middle = 1000 * self.curve.mean[:, [0, 2]]
+        along = np.gradient(self.curve.desired[:, [0, 2]], axis=0)
+        along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+        across = 1000 * self.curve.deviation[:, None] * np.column_stack([-along[:, 1], along[:, 0]])
+        band: Floats = np.vstack([middle + across, (middle - across)[::-1]])
+        axes.fill(band[:, 0], band[:, 1], color=self.colour, alpha=0.25, lw=0)
+        path_of(self.curve.mean, self.colour, self.label).draw(axes)
+
+
+def path_of(positions: Floats, colour: str, label: str, **style: Any) -> Mark:
+    """Return positions, shape (n, 3), m, in the plane XZ, mm."""
+    return Mark(1000 * positions[:, 0], 1000 * positions[:, 2], "-", colour, label, style={"lw": 1.1, **style})
+
+
+def desired_path(points: Floats) -> Mark:
+    """Return the desired path, to be under the others."""
+    return path_of(points, SOFT, "desired", lw=3.0, alpha=0.3)

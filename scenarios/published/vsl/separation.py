@@ -13,11 +13,14 @@ import numpy as np
 
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.statistics import LEVEL
+from handover.scenarios.published.claims import Statement
 from handover.scenarios.published.published_experiment import Claim
-from handover.scenarios.published.verdicts import format_p_value, nothing_measured, verdict_of
+from handover.scenarios.published.verdicts import format_p_value
 
 _NAMED = 5
 """Comparisons that are named where a claim fails."""
+_SPACE = "\u00a0"
+"""At which no line of a table is broken."""
 
 
 def p_value_of_separation(n: int) -> float:
@@ -62,46 +65,37 @@ class Comparison:
         return self.margin > 0.0
 
 
-def separation_claim(
-    claim: str, where: str, published: str, comparisons: Sequence[Comparison], *, beyond: bool = False
-) -> Claim:
+def separation_claim(claim: str, where: str, published: str, comparisons: Sequence[Comparison]) -> Claim:
     """Judge that, in all comparisons, one group has less error in each run, of pairs than its own.
 
     All comparisons are of groups, or all of pairs. Without enough runs of each group, it is not comparable.
     """
-    found = [c for c in comparisons if c.runs]
-    if not found or len(found) < len(comparisons):
-        return nothing_measured(claim, where, published, beyond)
-    n, held = min(c.runs for c in found), sum(c.holds for c in found)
-    closest = min(found, key=lambda c: c.margin)
-    every = f"in each of the {len(found)} comparisons " if len(found) > 1 else ""
-    paired = all(c.paired for c in found)
-    rule = "in each run the one error is less than the other"
-    if not paired:
-        rule = "each run of the one has less error than each of the other"
-    reason = f"{'Holds' if beyond else 'Reproduced'} if {every}{rule}."
-    if every:
-        reason += " A mean over all could hide one that goes the other way."
-    if n < MIN_RUNS:
-        why = "nothing is concluded" if paired else "that can be chance"
-        reason += f" With {n} {'runs' if n > 1 else 'run'} of each {why}: it takes {MIN_RUNS}."
-    elif paired:
-        reason += " Both errors are of the same runs, so no p-value of independent groups is given."
+    says, n = Statement(claim, where, published), min((c.runs for c in comparisons), default=0)
+    if not n:
+        return says.unknown()
+    held, failing = (sum(c.holds for c in comparisons), [c for c in comparisons if not c.holds])
+    closest = min(comparisons, key=lambda c: c.margin)
+    if all(c.paired for c in comparisons):
+        rule = "in each comparison and run the one error is less than the other"
     else:
-        p = format_p_value(p_value_of_separation(n))
-        reason += (
-            f" Runs of a group differ by the sensors' noise alone; that would separate {n} of each with p = {p} (rank "
-            "sums), which says nothing of another arm."
-        )
-    if failing := [f"{c.label} ({1000 * c.margin:+.2f} mm)" for c in found if not c.holds]:
-        reason += f" It fails at: {'; '.join(failing[:_NAMED])}"
-        reason += f"; and {len(failing) - _NAMED} more." if len(failing) > _NAMED else "."
-    return Claim(
-        claim=claim,
-        published=published,
-        measured=f"{held} of {len(found)}; the closest {1000 * closest.margin:+.2f} mm apart ({closest.label})",
-        verdict=verdict_of(held == len(found), could_be_either=n >= MIN_RUNS),
-        reason=reason,
-        where=where,
-        beyond=beyond,
+        p = f"; by noise alone {n} of each part so with p = {format_p_value(p_value_of_separation(n))}"
+        rule = f"in each comparison each run of the one has less error than each of the other{p}"
+    more = f"; and {len(failing) - _NAMED} more" if len(failing) > _NAMED else ""
+    named = "; ".join(f"{c.label} ({1000 * c.margin:+.2f} mm)" for c in failing[:_NAMED])
+    return says.judged(
+        f"{held} of {len(comparisons)}; the closest {1000 * closest.margin:+.2f} mm apart ({closest.label})",
+        not failing,
+        rule,
+        f"It fails at: {named}{more}." if failing else "",
+        runs=(n, MIN_RUNS),
     )
+
+
+def in_mm(errors: Floats) -> str:
+    """Return the mean of errors, m, in mm; "" of none."""
+    return f"{1000 * errors.mean():.1f}" if len(errors) else ""
+
+
+def spread_in_mm(errors: Floats) -> str:
+    """Return mean and standard deviation of errors, m, in mm, such as `1.5 ± 0.03`; of one value the value alone."""
+    return in_mm(errors) + (f"{_SPACE}±{_SPACE}{1000 * errors.std(ddof=1):.2f}" if len(errors) > 1 else "")

@@ -11,17 +11,16 @@ from support.sketched_figures import sketches as sketches
 
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.published.published_experiment import Claim, Verdict
-from handover.scenarios.published.vsl.vsl_2.experiment import Vsl2
-from handover.scenarios.published.vsl.vsl_2.runs import (
+from handover.scenarios.published.vsl.vsl_2 import (
     CASES,
     CUBIC,
     FEEDBACK,
-    JOINT_FACTORS,
+    JOINTS,
     LEARNED,
     MODEL_BASED,
+    NETWORK,
     OTHERS,
-    PUBLISHED,
-    RIGIDS,
+    Vsl2,
     Vsl2Runs,
 )
 from handover.scenarios.vsl.parameters import HybridParameters
@@ -75,8 +74,8 @@ STIFFER = "By {} the soft arm's tip has less error than that of a rigid arm with
 def test_each_run_is_of_one_way_on_one_arm():
     table = table_of()
     runs, ways = Vsl2Runs(table), (MODEL_BASED, *LEARNED, *FEEDBACK)
-    trained = [name for case in CASES for method in (*ways, *RIGIDS) for name in runs.names(case, method)]
-    others = [n for case in CASES for arm in OTHERS for method in ways for n in runs.names(case, method, arm)]
+    trained = [name for case in CASES for method in (*ways, *JOINTS.values()) for name in runs.of(case, method).names]
+    others = [n for case in CASES for arm in OTHERS for method in ways for n in runs.of(case, method, arm).names]
     assert len(trained + others) == len(table)
     assert len(set(trained + others)) == Vsl2().plan(quick=False).size
 
@@ -94,7 +93,7 @@ def test_the_claim_against_the_rigid_arm_gets_no_verdict_and_is_told_where_it_fa
     claims = claims_of(table_of())
     assert claims[AGAINST_RIGID].verdict is Verdict.NOT_COMPARABLE
     assert "depends on that" in claims[AGAINST_RIGID].reason
-    verdicts = [claims[STIFFER.format(PUBLISHED.label, factor)].verdict_text for factor in JOINT_FACTORS[1:]]
+    verdicts = [claims[STIFFER.format(NETWORK, factor)].verdict_text for factor in [*JOINTS][1:]]
     assert verdicts == ["holds", "does not hold", "does not hold"]
     hangs = next(t for t in Vsl2().tables(table_of()) if t.title.startswith("What the claim"))
     assert [row[3] for row in hangs.rows] == ["yes", "yes", "no", "no"]
@@ -103,7 +102,7 @@ def test_the_claim_against_the_rigid_arm_gets_no_verdict_and_is_told_where_it_fa
 
 def test_without_the_papers_network_its_claims_get_no_verdict():
     table = table_of(network=False)
-    assert Vsl2Runs(table).hybrid is CUBIC
+    assert Vsl2Runs(table).hybrid == CUBIC
     claims = claims_of(table)
     assert "Measured by cubic polynomials" in claims[COMMAND].reason
     assert [claims[c].verdict for c in (COMMAND, AGAINST_RIGID, BY_NETWORK)] == [Verdict.NOT_COMPARABLE] * 3
@@ -116,8 +115,8 @@ def test_without_the_papers_network_its_claims_get_no_verdict():
 def test_errors_on_other_arms_stand_apart():
     table = table_of()
     others = next(t for t in Vsl2().tables(table) if t.title.startswith("The trained arm"))
-    assert others.rows[0][:4] == ["trained", CASES[0].label, "30.0", "2.0"]
-    assert others.rows[2][:4] == ["links 10 % stiffer", CASES[0].label, "31.0", "3.0"]
+    assert others.rows[0][:4] == ["trained", next(iter(CASES)), "30.0", "2.0"]
+    assert others.rows[2][:4] == ["links 10 % stiffer", next(iter(CASES)), "31.0", "3.0"]
     assert len(others.rows) == len(CASES) * (1 + len(OTHERS))
 
     def fails_on_one(given: Given) -> float:

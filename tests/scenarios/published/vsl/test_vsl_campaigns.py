@@ -9,32 +9,30 @@ from support.in_process_pool import InProcessPool
 from support.sketched_figures import Sketches
 from support.sketched_figures import sketches as sketches
 
-from handover.controllers.vsl.paths import Path as TipPath
 from handover.cosim.record.reader import Record
 from handover.scenarios.campaign.campaign import run_campaign
 from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.plan_check import prepared
 from handover.scenarios.published.published_experiment import draw_figures
 from handover.scenarios.published.vsl.path_traces import PathTrace, Repetitions, trace_of
-from handover.scenarios.published.vsl.vsl_1.experiment import Vsl1
-from handover.scenarios.published.vsl.vsl_1.runs import RIGID, SOFT, Cell, Vsl1Runs
+from handover.scenarios.published.vsl.vsl_1 import Vsl1, Vsl1Runs, cell
 
 
 @pytest.mark.slow
 def test_a_trace_is_what_the_run_was_judged_by(tmp_path: Path, sketches: Sketches):
     plan = Vsl1().plan(quick=True)
-    cells = [Cell(TipPath.CURVE, 0.1, links) for links in (RIGID, SOFT[0])]
+    cells = [("curve", "100 g", arm) for arm in ("rigid", "0.5 bar")]
     folder = CampaignFolder(tmp_path / "c")
-    few = prepared(replace(plan, points=[cell.parameters for cell in cells]))
+    few = prepared(replace(plan, points=[cell(*which) for which in cells]))
     table = run_campaign(few, folder, InProcessPool(), lambda _tally: None)
     runs = Vsl1Runs(table)
-    for cell in cells:
-        (name,) = runs.names(cell)
+    for which in cells:
+        (name,) = runs.done.of(cell(*which)).names
         trace = trace_of(Record(folder.runs / name / "signals.parquet"))
         assert len(trace.desired) == 200
         for metric, path in (("mean_error", trace.tracked), ("servo_error", trace.servo)):
             mean = np.linalg.norm(path - trace.desired, axis=1).mean()
-            assert mean == pytest.approx(runs.metric(metric, cell)[0], rel=1e-9)
+            assert mean == pytest.approx(runs.of(metric, *which)[0], rel=1e-9)
         assert trace.along[-1] == pytest.approx(0.1 * np.pi, rel=0.01)
         assert trace.commanded == pytest.approx(trace.desired, abs=1e-9)  # by rigid kinematics nothing is compensated
     draw_figures(Vsl1(), table, folder.runs, folder.figures)

@@ -1,1 +1,0 @@
-"""Experiment 1 of [Gandarias2020]: paths by rigid kinematics."""

@@ -1,1 +1,0 @@
-"""Experiment 2 of [Gandarias2020]: paths by rigid kinematics and by learned corrections."""
