@@ -24,8 +24,11 @@ demo: $(VENV)/.installed
 
 install: $(VENV)/.installed
 
-test: lint $(VENV)/.installed-test
-	$(BIN)/python -m pytest $(PARALLEL) -m $(DEFAULT)
+# Linters and types beside the tests, which leave a processor idle here and there; their report is printed last.
+test: $(VENV)/.installed-test build/lint/handover
+	@$(MAKE) --silent lint > build/lint/report 2>&1 & lint=$$!; \
+	$(BIN)/python -m pytest $(PARALLEL) -m $(DEFAULT); tests=$$?; \
+	wait $$lint; lint=$$?; cat build/lint/report; exit $$((tests || lint))
 
 # The default tests of what differs from a commit: make test-changed SINCE=main
 test-changed: $(VENV)/.installed-test

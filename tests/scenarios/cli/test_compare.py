@@ -30,7 +30,6 @@ def compare(*arguments: object) -> Result:
     return call("compare", *arguments)
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("empty_figures")
 def test_a_known_difference_is_found_run_by_run(grasps: Path, tmp_path: Path, browser: Browser):
     out = tmp_path / "out"
@@ -66,7 +65,6 @@ def test_a_known_difference_is_found_run_by_run(grasps: Path, tmp_path: Path, br
         assert overflow(page) <= 0
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("empty_figures")
 def test_runs_are_compared_by_their_curves(grasps: Path, tmp_path: Path, browser: Browser):
     folders = [grasps / name / "runs" / "000_thing=cylinder_r0000" for name in ("far", "near")]

@@ -64,6 +64,7 @@ def cursor(picture: Pixels) -> float:
     return left + float(np.argmin(picture[rows, left:].astype(float).mean(axis=0)))
 
 
+@pytest.mark.slow
 def test_a_films_scene_and_cursor_move_with_the_times_of_its_frames(
     grasp: Path, tmp_path: Path, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
 ):

@@ -24,6 +24,7 @@ def cause(metrics: float) -> TeamCause:
     return TeamCause(int(metrics))
 
 
+@pytest.mark.slow
 def test_a_person_gives_a_large_object_to_two_compliant_robots(tmp_path: Path):
     done = run(TwoRobots, tmp_path / "run", "task=human_to_robots", "behaviour=compliant", seed=1)
     assert done.outcome.success, done.outcome.reason

@@ -43,7 +43,6 @@ def wanted(page: Page) -> list[float]:
     return page.evaluate("live.hand.pose().p_WH")
 
 
-@pytest.mark.slow
 def test_the_page_shows_the_hand_that_a_mouse_or_gamepad_leads_and_its_record_is_played_back(
     browser: Browser, tmp_path: Path
 ):

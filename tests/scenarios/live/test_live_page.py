@@ -63,7 +63,6 @@ def is_still(page: Page) -> str:
     )
 
 
-@pytest.mark.slow
 def test_a_run_is_followed_plotted_filmed_paused_and_stepped_and_its_record_is_that_of_a_run_alone(
     browser: Browser, tmp_path: Path
 ):
@@ -124,7 +123,6 @@ def test_a_run_is_followed_plotted_filmed_paused_and_stepped_and_its_record_is_t
     assert pq.read_table(tmp_path / "live" / "signals.parquet").equals(pq.read_table(alone / "signals.parquet"))
 
 
-@pytest.mark.slow
 def test_pictures_that_come_late_are_coarse_until_there_is_time_and_a_run_that_is_stopped_has_all_its_plots(
     browser: Browser, tmp_path: Path
 ):
@@ -158,7 +156,6 @@ def test_pictures_that_come_late_are_coarse_until_there_is_time_and_a_run_that_i
     assert len(Record(tmp_path / "live" / "signals.parquet").time) > 10
 
 
-@pytest.mark.slow
 def test_the_page_shows_what_the_cameras_see_and_the_run_is_the_same(browser: Browser, tmp_path: Path):
     given, cameras = ("-p", "patience=2"), "document.getElementById('cameras')"
     with (

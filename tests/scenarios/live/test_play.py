@@ -46,7 +46,6 @@ def changed(page: Page) -> list[str]:
     return page.locator("#runs td.set").all_inner_texts()
 
 
-@pytest.mark.slow
 def test_a_slider_begins_a_run_anew_and_a_run_is_that_of_its_command_is_shown_again_and_gets_a_report(
     browser: Browser, tmp_path: Path
 ):
@@ -177,7 +176,6 @@ def test_a_session_that_cannot_begin_is_refused(
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.slow
 def test_a_push_moves_the_robot_and_is_played_back_and_what_is_killed_is_told_as_lost(browser: Browser, tmp_path: Path):
     out = tmp_path / "runs"
     with (

@@ -297,7 +297,6 @@ def test_the_page_is_drawn_follows_its_reader_and_asks_for_nothing(page: Page):
     assert overflow(page) <= 0
 
 
-@pytest.mark.slow
 def test_without_webgl_a_sentence_says_so(browser: Browser, grasp: Path):
     page = browser.new_page()
     errors: list[str] = []
@@ -315,7 +314,6 @@ def test_without_webgl_a_sentence_says_so(browser: Browser, grasp: Path):
     page.close()
 
 
-@pytest.mark.slow
 def test_on_a_phone_in_the_dark_a_finger_scrolls_the_page_until_it_wakes_the_scene(browser: Browser, grasp: Path):
     context = browser.new_context(
         viewport={"width": 400, "height": 800}, has_touch=True, is_mobile=True, color_scheme="dark"

@@ -51,7 +51,6 @@ def opened(browser: Browser, address: str, **options: object) -> Generator[Page,
         context.close()
 
 
-@pytest.mark.slow
 def test_a_round_is_played_with_the_mouse_and_rated_by_keys_and_who_comes_next_may_go_on(
     browser: Browser, tmp_path: Path
 ):
@@ -123,7 +122,6 @@ def test_a_round_is_played_with_the_mouse_and_rated_by_keys_and_who_comes_next_m
         assert page.locator("#who").inner_text() == "Participant P01"
 
 
-@pytest.mark.slow
 def test_a_phone_shows_both_views_and_tells_how_far_the_hand_is_from_the_ball(browser: Browser, tmp_path: Path):
     plan = pilot_plan(tmp_path / "plan.toml", devices='["touch"]', patience=15, practice=300)
     far = "Number(document.querySelector('#task').textContent.match(/It is (\\d+) cm away/)?.[1])"
@@ -156,7 +154,6 @@ def test_a_phone_shows_both_views_and_tells_how_far_the_hand_is_from_the_ball(br
         wait_until(page, f"{still}.hidden")
 
 
-@pytest.mark.slow
 def test_a_page_in_german_tells_that_the_practice_is_over_and_why_a_round_is_void_and_who_goes_on_may_stop(
     browser: Browser, tmp_path: Path
 ):
