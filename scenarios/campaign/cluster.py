@@ -1,14 +1,17 @@
-"""The workers of a Dask cluster as a worker pool, and calls with a timeout to processes that may never answer."""
+"""The workers of a Dask cluster that the user runs, and calls with a timeout to processes that may never answer."""
 
 import contextlib
 import itertools
+import logging
 import queue
 import threading
 import uuid
+import warnings
 from collections.abc import Callable, Generator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
+from dask import config
 from distributed import Client, Future, KilledWorker
 
 from handover.cosim.exceptions import one_line
@@ -25,6 +28,11 @@ from handover.scenarios.execution.errors import ClusterLost, PoolError
 from handover.scenarios.results.run_folder import disk_errors_reported, versions
 
 _T = TypeVar("_T")
+
+_SILENT = logging.CRITICAL + 1
+_LOGGERS = ("distributed", "distributed.client", "distributed.gc", "tornado", "tornado.application", "asyncio")
+_FIRST_WORKER_TIMEOUT = 3.0
+"""How long is waited for a cluster's first worker, s."""
 
 
 def call_with_timeout(function: Callable[[], _T], timeout: float) -> _T:
@@ -201,3 +209,40 @@ def _difference(here: Mapping[str, str], there: Any) -> str:
     if isinstance(there, BaseException):
         return f"cannot run this package: {type(there).__name__}: {one_line(there)}"
     return difference(here, there)
+
+
+@contextlib.contextmanager
+def connect_cluster(address: str) -> Generator[ClusterPool, None, None]:
+    """Connect to a cluster that the user runs; the address is one that `scheduler_address` has returned.
+
+    Raises:
+        PoolError: no scheduler answers there, or it has no workers.
+    """
+    with _quiet(), config.set({"distributed.comm.timeouts.connect": "5s"}), contextlib.ExitStack() as opened:
+        try:
+            client = opened.enter_context(Client(address, timeout=5, set_as_default=False))
+        except (OSError, ValueError) as e:
+            raise PoolError(f"the scheduler at {address} cannot be used: {one_line(e)}") from e
+        try:
+            client.wait_for_workers(1, timeout=_FIRST_WORKER_TIMEOUT)
+        except TimeoutError as e:
+            raise PoolError(f"the scheduler at {address} has no workers; `dask worker {address}` starts some") from e
+        pool = ClusterPool(client, f"the cluster at {address}")
+        opened.callback(pool.end)
+        yield pool
+
+
+@contextlib.contextmanager
+def _quiet() -> Generator[None, None, None]:
+    """Keep Dask's own log and warnings off the terminal: `PoolError` and job results report what matters."""
+    loggers = [logging.getLogger(name) for name in _LOGGERS]
+    before = [logger.level for logger in loggers]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # such as that versions of Dask's packages differ
+        for logger in loggers:
+            logger.setLevel(_SILENT)
+        try:
+            yield
+        finally:
+            for logger, level in zip(loggers, before, strict=True):
+                logger.setLevel(level)

@@ -1,6 +1,6 @@
 """Configuration of a campaign's worker pool, workers of this machine or of a Dask scheduler, and its lazy start.
 
-Dask, which takes a while to load, is imported when workers are started.
+Dask, which takes a while to load, is imported for the workers of a scheduler alone.
 """
 
 import contextlib
@@ -9,6 +9,7 @@ from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from handover.scenarios.campaign.local_pool import LocalPool
 from handover.scenarios.campaign.worker_pool import JobResult, RunJob, WorkerPool, cores
 
 
@@ -46,9 +47,11 @@ class PoolConfig:
         Raises:
             PoolError: here or on entering, if they cannot be started or used.
         """
-        from handover.scenarios.campaign.local_cluster import connect_cluster, local_cluster
+        if self.scheduler is None:
+            return LocalPool(self.workers)
+        from handover.scenarios.campaign.cluster import connect_cluster
 
-        return local_cluster(self.workers) if self.scheduler is None else connect_cluster(self._address)
+        return connect_cluster(self._address)
 
     @functools.cached_property
     def _address(self) -> str:

@@ -1,6 +1,6 @@
 """The worker pool that runs a campaign, as a protocol; its jobs, their results, how they pass a pipe, counts of runs.
 
-`handover.scenarios.campaign.cluster` implements it by Dask.
+`LocalPool` implements it on this machine, `ClusterPool` by Dask.
 """
 
 import os

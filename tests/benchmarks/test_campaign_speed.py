@@ -19,7 +19,7 @@ from pytest_benchmark.fixture import BenchmarkFixture
 
 from handover.cosim.stepping.options import MasterOptions
 from handover.fmus.build import cached
-from handover.scenarios.campaign.local_cluster import local_cluster
+from handover.scenarios.campaign.local_pool import LocalPool
 from handover.scenarios.campaign.worker_pool import RunJob, WorkerPool
 from handover.scenarios.catalog import SCENARIOS
 
@@ -68,7 +68,7 @@ def processor_time(process: psutil.Process) -> float:
 
 
 def test_a_campaign_costs_little_beside_its_runs(benchmark: BenchmarkFixture, tmp_path: Path) -> None:
-    """CPU time, which a busy machine does not change, is also what Dask, forks and pipes take while they wait."""
+    """CPU time, which a busy machine does not change, is also what forks and pipes take while they wait."""
     found: list[tuple[float, float]] = []
 
     def measure() -> None:
@@ -80,7 +80,7 @@ def test_a_campaign_costs_little_beside_its_runs(benchmark: BenchmarkFixture, tm
         cpu_of_runs = sum(summary["cpu_seconds"] for summary in summaries)
         found.append(((took - spent) / spent, (cpu - cpu_of_runs) / cpu_of_runs))
 
-    with local_cluster(1) as pool:
+    with LocalPool(1) as pool:
         carried_out(pool, jobs(tmp_path / "first", 1))
         benchmark.pedantic(measure, rounds=ROUNDS if benchmark.enabled else 1)
     overhead, of_cpu = (min(each) for each in zip(*found, strict=True))
@@ -96,7 +96,7 @@ def test_two_workers_are_nearly_twice_as_fast_as_one(benchmark: BenchmarkFixture
 
     def measure() -> None:
         for workers, seconds in took.items():
-            with local_cluster(workers) as pool:
+            with LocalPool(workers) as pool:
                 carried_out(pool, jobs(tmp_path / f"first_{workers}_{len(seconds)}", workers))
                 given = jobs(tmp_path / f"{workers}_{len(seconds)}", RUNS if benchmark.enabled else 2)
                 seconds.append(carried_out(pool, given)[0])

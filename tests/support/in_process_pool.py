@@ -3,15 +3,12 @@
 import contextlib
 import os
 import shutil
-import sys
-import types
 from collections.abc import Callable, Generator, Sequence
 from pathlib import Path
 
+from handover.scenarios.campaign import pool_config
 from handover.scenarios.campaign.run_job import run_job
 from handover.scenarios.campaign.worker_pool import JobResult, RunJob
-
-LOCAL_CLUSTER = "handover.scenarios.campaign.local_cluster"
 
 
 class InProcessPool:
@@ -24,7 +21,7 @@ class InProcessPool:
     @classmethod
     @contextlib.contextmanager
     def opened(cls, _workers: int | None) -> "Generator[InProcessPool, None, None]":
-        """Stand in for `local_cluster`."""
+        """Stand in for `LocalPool`."""
         yield cls()
 
     def check(self, folder: Path) -> None:
@@ -49,18 +46,6 @@ def _run(job: RunJob) -> None:
     os.replace(unfinished, Path(job.runs) / job.name)
 
 
-def local_cluster_of(pool: InProcessPool) -> types.ModuleType:
-    """Return what takes the place of the module `local_cluster`, so that campaigns of this process have a pool."""
-
-    @contextlib.contextmanager
-    def local_cluster(_workers: int | None) -> Generator[InProcessPool, None, None]:
-        yield pool
-
-    module = types.ModuleType(LOCAL_CLUSTER)
-    vars(module).update(local_cluster=local_cluster, connect_cluster=None)
-    return module
-
-
 def use_in_process_pool() -> None:
-    """Let this process execute campaigns' runs itself, without Dask; `before` of a `Command`."""
-    sys.modules[LOCAL_CLUSTER] = local_cluster_of(InProcessPool())
+    """Let this process execute campaigns' runs itself; `before` of a `Command`."""
+    pool_config.LocalPool = InProcessPool.opened  # type: ignore

@@ -32,12 +32,6 @@ def ended(sweep: SweepProcess) -> Ended:
     return sweep.wait(600.0)
 
 
-def workers_of(process: int) -> list[psutil.Process]:
-    """Return the workers that a process has started: an embedded cluster, or a nanny."""
-    children = psutil.Process(process).children()
-    return [p for p in children if any("spawn_main" in text for text in p.cmdline())]
-
-
 def runs_in(folder: Path) -> dict[str, tuple[int, int]]:
     """Return the runs that are done, with the inode and time of their summaries, which change if a run is repeated."""
     runs = [p for p in (folder / "runs").glob("[!.]*") if p.is_dir()]

@@ -11,7 +11,7 @@ from support.cosim.native_units import native_fmu
 from support.in_process_pool import InProcessPool
 
 import handover
-from handover.scenarios.campaign import local_cluster
+from handover.scenarios.campaign import pool_config
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
 
@@ -39,7 +39,7 @@ def test_a_program_without_a_main_guard_sweeps(tmp_path: Path):
 @pytest.fixture
 def in_process(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let this process be the workers."""
-    monkeypatch.setattr(local_cluster, "local_cluster", InProcessPool.opened)
+    monkeypatch.setattr(pool_config, "LocalPool", InProcessPool.opened)
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +47,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder of a campaign of four runs, two at a point."""
     out = tmp_path_factory.mktemp("campaigns") / "c"
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(local_cluster, "local_cluster", InProcessPool.opened)
+        patched.setattr(pool_config, "LocalPool", InProcessPool.opened)
         handover.sweep("ir_grasp", **GIVEN, out=out, progress=False)
     return out
 

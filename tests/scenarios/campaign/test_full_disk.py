@@ -17,7 +17,7 @@ from support.cosim.native_units import native_fmu
 from support.in_process_pool import InProcessPool
 
 from handover.cosim.stepping.options import MasterOptions
-from handover.scenarios.campaign import local_cluster
+from handover.scenarios.campaign import pool_config
 from handover.scenarios.campaign.cluster import ClusterPool
 from handover.scenarios.campaign.run_server import RunServer
 from handover.scenarios.campaign.table import CampaignTable
@@ -43,7 +43,7 @@ def sweep(monkeypatch: pytest.MonkeyPatch, pool: WorkerPool) -> Result:
     def given(_workers: int | None) -> Generator[WorkerPool, None, None]:
         yield pool
 
-    monkeypatch.setattr(local_cluster, "local_cluster", given)
+    monkeypatch.setattr(pool_config, "LocalPool", given)
     return call(*CALL)
 
 

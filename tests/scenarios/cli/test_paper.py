@@ -1,15 +1,15 @@
 """The command `handover paper`."""
 
 import shutil
-import sys
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from click.testing import Result
 from support.commands import call, data_in
-from support.in_process_pool import LOCAL_CLUSTER, InProcessPool, local_cluster_of
+from support.in_process_pool import InProcessPool
 
+from handover.scenarios.campaign import pool_config
 from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign_report.campaign_page import write_campaign_page
 from handover.scenarios.published.catalog import EXPERIMENTS
@@ -38,7 +38,7 @@ def test_it_leaves_claims_figures_and_a_page_and_a_second_call_repeats_nothing(
     cylinder = [point for point in whole.points if point["thing"] == "cylinder"]
     few = replace(whole, points=cylinder, repetitions=1)
     monkeypatch.setattr(EXPERIMENTS["ir-table"], "plan", lambda _experiment, _quick: few)  # type: ignore
-    monkeypatch.setitem(sys.modules, LOCAL_CLUSTER, local_cluster_of(InProcessPool()))
+    monkeypatch.setattr(pool_config, "LocalPool", InProcessPool.opened)
     folder = tmp_path / "c"
     first = paper("ir-table", "--quick", "--out", folder)
     assert first.exit_code == 0, first.output

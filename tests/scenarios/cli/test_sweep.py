@@ -1,8 +1,7 @@
 """`handover sweep`: its output and its exit status."""
 
 import contextlib
-import sys
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -10,10 +9,11 @@ from click.testing import Result
 from support.clusters import closed_port
 from support.commands import call
 from support.cosim.native_units import native_fmu
-from support.in_process_pool import LOCAL_CLUSTER, InProcessPool, local_cluster_of
+from support.in_process_pool import InProcessPool
 
 from handover.cosim.files import folder_locked
-from handover.scenarios.campaign import plan_check
+from handover.scenarios.campaign import plan_check, pool_config
+from handover.scenarios.campaign.local_pool import LocalPool
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.campaign.worker_pool import RunJob
 from handover.scenarios.execution.errors import ClusterLost, PoolError
@@ -35,21 +35,21 @@ def sweep(
 ) -> tuple[Result, list[str]]:
     """Return how a command ended, and which runs it began."""
     pool = InProcessPool(before)
-    monkeypatch.setitem(sys.modules, LOCAL_CLUSTER, local_cluster_of(pool))
+
+    def given(_workers: int | None) -> contextlib.AbstractContextManager[InProcessPool]:
+        return contextlib.nullcontext(pool)
+
+    monkeypatch.setattr(pool_config, "LocalPool", given)
     return call(*CALL, *more), pool.begun
 
 
 def refuse_workers(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let no workers be had."""
 
-    @contextlib.contextmanager
-    def refuse(_workers: int | None) -> Generator[InProcessPool, None, None]:
+    def refuse(_pool: LocalPool, _folder: Path) -> None:
         raise PoolError("there are none")
-        yield InProcessPool()
 
-    module = local_cluster_of(InProcessPool())
-    monkeypatch.setattr(module, "local_cluster", refuse)
-    monkeypatch.setitem(sys.modules, LOCAL_CLUSTER, module)
+    monkeypatch.setattr(LocalPool, "check", refuse)
 
 
 def raising(error: BaseException) -> Callable[[RunJob], str]:

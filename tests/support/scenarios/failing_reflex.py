@@ -46,6 +46,12 @@ class IsKilled(BadReflex):
         os.kill(os.getpid(), signal.SIGKILL)
 
 
+class KillsItsServer(BadReflex):
+    def misbehave(self) -> None:
+        os.kill(os.getppid(), signal.SIGKILL)
+        time.sleep(60)
+
+
 class KillsItsWorker(BadReflex):
     def misbehave(self) -> None:
         worker = int(Path(f"/proc/{os.getppid()}/stat").read_text().rpartition(")")[2].split()[1])

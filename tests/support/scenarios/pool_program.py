@@ -5,11 +5,12 @@ import sys
 from pathlib import Path
 
 if __name__ == "__main__":
-    from handover.scenarios.campaign.local_cluster import connect_cluster, local_cluster
+    from handover.scenarios.campaign.cluster import connect_cluster
+    from handover.scenarios.campaign.local_pool import LocalPool
 
     jobs = pickle.loads(Path(sys.argv[1]).read_bytes())
     try:
-        with connect_cluster(sys.argv[2]) if sys.argv[2:] else local_cluster(2) as pool:
+        with connect_cluster(sys.argv[2]) if sys.argv[2:] else LocalPool(2) as pool:
             for result in pool.run_jobs(jobs):
                 print(result.name, result.lost, flush=True)
     except KeyboardInterrupt:

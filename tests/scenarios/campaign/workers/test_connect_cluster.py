@@ -12,7 +12,7 @@ from support.clusters import scheduler, worker
 from support.processes import lives, program, servers, until
 from support.scenarios.sample_jobs import bad_job, quick_job
 
-from handover.scenarios.campaign.local_cluster import connect_cluster
+from handover.scenarios.campaign.cluster import connect_cluster
 from handover.scenarios.campaign.scheduler import scheduler_address
 from handover.scenarios.execution.errors import PoolError
 
@@ -54,6 +54,14 @@ def test_threads_of_a_worker_execute_runs_in_parallel(address: str, nanny: int, 
         assert len(servers(nanny)) == 2
     assert sorted(results) == [("bad", ""), *((f"run_{i}", "") for i in range(4))]
     assert servers(nanny) == []  # though the cluster lives on
+
+
+def test_a_run_that_always_takes_its_worker_with_it_is_given_up(address: str, nanny: int, tmp_path: Path):  # noqa: ARG001
+    runs = tmp_path / "runs"
+    with connect_cluster(address) as pool:
+        (result,) = pool.run_jobs([bad_job(runs, "KillsItsWorker", tmp_path)])
+    assert result.lost == "its worker was lost 4 times: killed, or out of memory"
+    until(lambda: list(runs.iterdir()) == [])  # the last worker's server sees to that when its worker is gone
 
 
 def test_a_command_that_is_killed_leaves_no_run_on_the_cluster(address: str, nanny: int, tmp_path: Path):

@@ -12,7 +12,7 @@ from support.scenarios.sample_jobs import quick_job
 
 from handover.cosim.blocks.block import InvalidState
 from handover.cosim.stepping.options import AdaptiveStep, Algorithm, Extrapolation, MasterOptions
-from handover.scenarios.campaign.worker import ServerLost, ServerProcess
+from handover.scenarios.campaign.run_servers import ServerLost, ServerProcess
 from handover.scenarios.campaign.worker_pool import JobResult, read_message, write_message
 
 

@@ -26,8 +26,8 @@ from handover.cosim.stepping.options import MasterOptions
 from handover.fmus.build import cached
 from handover.scenarios.campaign.plan import PlannedRun
 from handover.scenarios.campaign.run_server import load_modules
+from handover.scenarios.campaign.run_servers import NotWanted, ServerLost, ServerProcess
 from handover.scenarios.campaign.table import row_of
-from handover.scenarios.campaign.worker import NotWanted, ServerLost, ServerProcess
 
 slow = pytest.mark.slow
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks for processes in /proc")
@@ -131,6 +131,7 @@ def test_a_run_without_a_summary_leaves_nothing(
     assert list((tmp_path / "runs").iterdir()) == []
 
 
+@pytest.mark.slow
 def test_an_invalid_job_is_lost_with_the_reason(server: ServerProcess, tmp_path: Path):
     assert "has no parameter 'gloss'" in server.run_job(job(tmp_path / "runs", "run", "gloss=1"), yes).lost
     unknown = replace(job(tmp_path / "runs"), scenario="juggle")

@@ -12,7 +12,7 @@ from support.clusters import scheduler
 from support.in_process_pool import InProcessPool
 from support.wording import Wording
 
-from handover.scenarios.campaign import local_cluster
+from handover.scenarios.campaign import cluster
 from handover.scenarios.campaign import scheduler as of_scheduler
 from handover.scenarios.campaign.cluster import call_with_timeout
 from handover.scenarios.campaign.pool_config import PoolConfig
@@ -88,7 +88,7 @@ def test_workers_are_those_of_the_scheduler_that_has_answered(checked: bool, mon
         yield InProcessPool()
 
     monkeypatch.setattr(of_scheduler, "scheduler_address", result)
-    monkeypatch.setattr(local_cluster, "connect_cluster", connect_cluster)
+    monkeypatch.setattr(cluster, "connect_cluster", connect_cluster)
     config = PoolConfig(scheduler="h:1")
     if checked:
         config.check()

@@ -10,9 +10,9 @@ import pytest
 from distributed import Client
 from support.scenarios.sample_jobs import job, quick_job
 
-from handover.scenarios.campaign import worker
+from handover.scenarios.campaign import run_servers, worker
 from handover.scenarios.campaign.run_job import run_job
-from handover.scenarios.campaign.worker import ServerProcess
+from handover.scenarios.campaign.run_servers import ServerProcess
 from handover.scenarios.results.run_folder import versions
 
 
@@ -28,7 +28,7 @@ def test_a_job_of_a_batch_that_has_been_ended_starts_no_server(tmp_path: Path, m
         arguments: list[Any] = [quick_job(tmp_path / "runs"), batch, versions()]
         return client.submit(worker.run_job_on_worker, *arguments, pure=False).result(timeout=60).lost
 
-    monkeypatch.setattr(worker, "ServerProcess", started_server)
+    monkeypatch.setattr(run_servers, "ServerProcess", started_server)
     with Client(processes=False, n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0") as client:
         client.run(worker.end_runs, "ended")
         assert lost(client, "ended") == "it was ended, as nobody waited for it"

@@ -22,7 +22,7 @@ from support.wording import Wording
 
 from handover.scenarios.campaign.campaign import run_campaign
 from handover.scenarios.campaign.folder import CampaignFolder
-from handover.scenarios.campaign.local_cluster import local_cluster
+from handover.scenarios.campaign.local_pool import LocalPool
 from handover.scenarios.campaign.plan_check import checked_plan, prepared
 from handover.scenarios.campaign.statistics import MIN_SAMPLES
 from handover.scenarios.campaign.table import CampaignTable
@@ -301,7 +301,7 @@ def test_the_record_of_a_handover_is_judged_and_drawn(tmp_path: Path, sketches: 
 def test_table_1_at_full_size(tmp_path: Path):
     folder = CampaignFolder(tmp_path / "campaign")
     ready = prepared(Helix1().plan(quick=False))
-    with local_cluster(None) as pool:
+    with LocalPool(None) as pool:
         table = run_campaign(ready, folder, pool, CampaignProgress(StringIO()))
     assert set(table.column("status")) == {"done"}
     for part in ("begins to close in every run", "The arm's time falls", "With our settings every handover succeeds"):

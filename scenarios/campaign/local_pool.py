@@ -1,0 +1,89 @@
+"""Workers on this machine's cores: a thread for each, which gives jobs to a run server."""
+
+import queue
+import threading
+import uuid
+from collections.abc import Generator, Sequence
+from pathlib import Path
+from types import TracebackType
+
+from handover.scenarios.campaign.run_servers import JobRunner
+from handover.scenarios.campaign.worker_pool import JobResult, RunJob, cores
+from handover.scenarios.results.run_folder import disk_errors_reported
+
+
+class LocalPool:
+    """Run servers of this process, started with their first job. They end with it, however it ends.
+
+    They receive no Ctrl-C: this process does, and ends them.
+
+    Args:
+        workers: how many; None for one for each core that this process may use.
+    """
+
+    def __init__(self, workers: int | None) -> None:
+        self.workers = workers or cores()
+        """How many jobs run at the same time."""
+        self._runners = [JobRunner() for _ in range(self.workers)]
+
+    def __enter__(self) -> "LocalPool":
+        """Return itself."""
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        """End the run servers."""
+        self._end()
+
+    def check(self, folder: Path) -> None:
+        """Check that a folder can be written to.
+
+        Raises:
+            RecordNotWritten: it cannot.
+        """
+        mark = folder / f".{uuid.uuid4().hex}"
+        with disk_errors_reported(folder):
+            try:
+                mark.write_text(mark.name, encoding="utf-8")
+            finally:
+                mark.unlink(missing_ok=True)
+
+    def run_jobs(self, jobs: Sequence[RunJob]) -> Generator[JobResult, None, None]:
+        """Give each job to a run server; yield the results as they come.
+
+        If the iteration is left before its end, runs under way are ended and leave nothing.
+        """
+        waiting: queue.SimpleQueue[RunJob] = queue.SimpleQueue()
+        done: queue.SimpleQueue[JobResult] = queue.SimpleQueue()
+        left = threading.Event()
+        for job in jobs:
+            waiting.put(job)
+
+        def work(runner: JobRunner) -> None:
+            while not left.is_set():
+                try:
+                    job = waiting.get_nowait()
+                except queue.Empty:
+                    return
+                done.put(runner.run(job, lambda: not left.is_set()))
+
+        threads = [threading.Thread(target=work, args=(runner,), daemon=True) for runner in self._runners[: len(jobs)]]
+        for thread in threads:
+            thread.start()
+        try:
+            for _ in jobs:
+                yield done.get()
+        except BaseException:
+            left.set()
+            self._end()
+            raise
+        finally:
+            for thread in threads:
+                thread.join()
+
+    def _end(self) -> None:
+        """End the run servers, and their runs; later jobs get others."""
+        ended, self._runners = self._runners, [JobRunner() for _ in range(self.workers)]
+        for runner in ended:
+            runner.ask_to_end()
+        for runner in ended:
+            runner.end()
