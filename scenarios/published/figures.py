@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
 
+from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import COLOURS, figure, legend_below
 
@@ -64,7 +65,8 @@ class Mark:
         if self.bars is not None:
             axes.errorbar(self.x, self.y, self.bars, fmt="none", ecolor=self.colour, elinewidth=0.8, capsize=2)
         usual: dict[str, Any] = {"lw": 1.2, "ms": 4.0, "color": self.colour, "label": label}
-        axes.plot(self.x, self.y, "" if "ls" in self.style else self.form, **{**usual, **self.style})
+        form = () if "ls" in self.style else (self.form,)
+        axes.plot(self.x, self.y, *form, **{**usual, **self.style})
 
 
 def level(value: float, colour: str = SOFT, label: str = "", *, upright: bool = False, **style: Any) -> "Line":
@@ -86,6 +88,21 @@ class Line:
 
 
 @dataclass(frozen=True)
+class Bars:
+    """Upright bars: places and heights."""
+
+    points: Sequence[tuple[float, float]]
+    width: float
+    colour: str
+    label: str = ""
+
+    def draw(self, axes: Axes) -> None:
+        """Draw them."""
+        x, y = [x for x, _ in self.points], [y for _, y in self.points]
+        axes.bar(x, y, width=self.width, color=self.colour, label=self.label)
+
+
+@dataclass(frozen=True)
 class Panel:
     """A panel: what is drawn into it, and what its axes are told by matplotlib's names.
 
@@ -93,12 +110,14 @@ class Panel:
         marks: in their order.
         axes: title, labels, limits, scales.
         x_ticks, y_ticks: places and texts of ticks, which are then the only ones.
+        small: whether these texts are small.
     """
 
     marks: Sequence[Drawable]
     axes: Mapping[str, Any]
     x_ticks: Mapping[float, str] | None = None
     y_ticks: Mapping[float, str] | None = None
+    small: bool = False
 
     def draw(self, axes: Axes) -> None:
         """Draw it."""
@@ -107,8 +126,14 @@ class Panel:
         axes.set(**self.axes)
         for axis, ticks in ((axes.xaxis, self.x_ticks), (axes.yaxis, self.y_ticks)):
             if ticks is not None:
-                axis.set_ticks(list(ticks), list(ticks.values()))
+                axis.set_ticks(list(ticks), list(ticks.values()), fontsize=7 if self.small else None)
                 axis.set_ticks([], minor=True)
+
+
+def records_of(names: Iterable[str], runs: Path) -> list[Record]:
+    """Return the records of runs, given by the names of their folders in `runs`, of those that left one."""
+    files = (runs / name / "signals.parquet" for name in names)
+    return [Record(file) for file in files if file.exists()]
 
 
 def drawn(

@@ -7,7 +7,7 @@ runs; `write_claims` and `draw_figures` write what it leaves in the campaign's f
 import abc
 import enum
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
@@ -17,6 +17,7 @@ from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.display_unit import DisplayUnit, display_unit
 from handover.scenarios.experiment.experiment import Figure
+from handover.scenarios.published.runs import Row, Runs, is_done
 from handover.scenarios.results.run_folder import disk_errors_reported, folder_within, write_whole
 
 
@@ -167,6 +168,10 @@ class PublishedExperiment(abc.ABC):
     def campaign(self, points: Sequence[Mapping[str, str]], **others: Any) -> CampaignPlan:
         """Return a plan of points; the others are those of `CampaignPlan`."""
         return CampaignPlan(scenario=self.scenario, points=points, experiment=self.name, **others)
+
+    def runs(self, table: CampaignTable, keep: Callable[[Row], bool] = is_done, free: Sequence[str] = ()) -> Runs:
+        """Return the runs of a campaign's table to keep; `free` names parameters that do not tell points apart."""
+        return Runs.of_plan(table, self.plan(quick=False), keep, free)
 
     @abc.abstractmethod
     def claims(self, table: CampaignTable) -> Sequence[Claim]:

@@ -1,10 +1,10 @@
 """Where the free-flyer's impedance loop is stable, by communication step and delay, beside its controller's poles."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from functools import cache
+from itertools import product
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -14,13 +14,15 @@ from handover.plants.free_flyer.robot.thrusters import Params as ThrustersParams
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
-from handover.scenarios.experiment.plotting import COLOURS, figure, legend_below
+from handover.scenarios.experiment.plotting import COLOURS
 from handover.scenarios.free_flyer.parameters import Behaviour
 from handover.scenarios.free_flyer.push.impedance import FlyerImpedance
-from handover.scenarios.published.free_flyer.push_runs import linear_loop
-from handover.scenarios.published.free_flyer.variations import is_done
+from handover.scenarios.published.claims import Statement
+from handover.scenarios.published.figures import Mark, Panel, drawn
+from handover.scenarios.published.free_flyer.linear_model import linear_loop
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment
-from handover.scenarios.published.verdicts import nothing_measured, verdict_of
+from handover.scenarios.published.runs import is_done
+from handover.scenarios.published.tables import table_of
 
 _STEPS = (0.001, 0.002, 0.004, 0.008, 0.016)
 """Communication steps of a host that steps all units in parallel, s."""
@@ -39,27 +41,15 @@ _TWISTS = {Behaviour.RIGID: "1", Behaviour.COMPLIANT: "0.3"}
 """Torques, N m, that take the robot well out of what counts as rest: from there a growing oscillation is seen."""
 _BESIDE = 0.0005
 """How far beyond the steps that were tried the poles' boundary is drawn, s."""
-_WITHOUT_LIMITS = {"thrusters.f_max": "1000,1000,1000", "thrusters.tau_max": "1000,1000,1000"}
+_NO_LIMITS = "1000,1000,1000"
+
+Loop = tuple[Behaviour, bool]
+"""A behaviour, and whether propulsion follows its command with a lag; it has no limits."""
+_LOOPS: Sequence[Loop] = [*product(Behaviour, (False, True))]
 
 
-@dataclass(frozen=True)
-class _Loop:
-    """A behaviour, with propulsion that follows its command at once or with a lag; neither has limits."""
-
-    behaviour: Behaviour
-    lags: bool
-
-    @property
-    def label(self) -> str:
-        return f"{self.behaviour.item}, {'with' if self.lags else 'without'} lag"
-
-    @property
-    def parameters(self) -> dict[str, str]:
-        propulsion = {"propulsion": "limited", **_WITHOUT_LIMITS} if self.lags else {"propulsion": "ideal"}
-        return {"behaviour": self.behaviour.item, "torque": _TWISTS[self.behaviour], **propulsion}
-
-
-_LOOPS = tuple(_Loop(behaviour, lags) for behaviour in Behaviour for lags in (False, True))
+def _label(loop: Loop) -> str:
+    return f"{loop[0].item}, {'with' if loop[1] else 'without'} lag"
 
 
 class FlyerStability(PublishedExperiment):
@@ -77,146 +67,135 @@ class FlyerStability(PublishedExperiment):
 
     def plan(self, quick: bool) -> CampaignPlan:
         """Return loops x steps x delays."""
-        return CampaignPlan(
-            scenario=self.scenario,
-            points=[
-                {**loop.parameters, "parallel_step": f"{step:g}", "delay": f"{delay:g}"}
-                for loop in _LOOPS
-                if not (quick and loop.behaviour is Behaviour.COMPLIANT)
+        ideal = {"propulsion": "ideal"}
+        lagging = {"propulsion": "limited", "thrusters.f_max": _NO_LIMITS, "thrusters.tau_max": _NO_LIMITS}
+        return self.campaign(
+            [
+                {
+                    "behaviour": b.item,
+                    "torque": _TWISTS[b],
+                    **(lagging if lags else ideal),
+                    "parallel_step": f"{step:g}",
+                    "delay": f"{delay:g}",
+                }
+                for b, lags in _LOOPS
+                if not (quick and b is Behaviour.COMPLIANT)
                 for step in ((_QUICK_STEP,) if quick else _STEPS)
-                for delay in _DELAYS[loop.behaviour]
+                for delay in _DELAYS[b]
             ],
             fixed={"kind": "torque", "axis": "y", "delay_known": "false", "patience": "30"},
             seed=5,
             options=MasterOptions(algorithm=Algorithm.JACOBI),
-            experiment=self.name,
         )
 
     def claims(self, table: CampaignTable) -> Sequence[Claim]:
-        """Judge whether runs and poles agree."""
-        return [_agrees(_Map(table))]
+        """Judge whether runs and poles agree; runs in which a motion diverged until a unit failed are not at rest."""
+        says = Statement("The robot comes to rest where its controller's poles say so, and nowhere else")
+        compared = [
+            (_pole_radius(b, lags, delay + _COUPLING_DELAYS * step), rests)
+            for b, lags, step, delay, rests in _runs(table)
+        ]
+        clear = [(radius < 1.0, rests) for radius, rests in compared if abs(radius - 1.0) > _MARGIN]
+        near = [(radius < 1.0, rests) for radius, rests in compared if abs(radius - 1.0) <= _MARGIN]
+        if not clear:
+            return [says.unknown()]
+        diverged, lost = (
+            sum(row["status"] == s and row.get("parallel_step") is not None for row in table.rows)
+            for s in ("failed", "lost")
+        )
+        agree, stable = sum(said is rests for said, rests in clear), sum(said for said, _ in clear)
+        claim = says.judged(
+            f"{agree} of {len(clear)} runs, of which {stable} are stable by their poles; {len(near)} near the unit "
+            "circle left out",
+            agree == len(clear) and not lost,
+            f"all do whose largest pole is more than {_MARGIN:g} from the unit circle, and none was lost",
+            f"Of the {len(near)} nearer ones {sum(said is rests for said, rests in near)} agree. Runs that diverged "
+            f"until a unit failed, {diverged}, count as not at rest; {lost} were lost.",
+            enough=0 < stable < len(clear),
+        )
+        return [claim]
 
     def tables(self, table: CampaignTable) -> Sequence[ComparisonTable]:
         """Return, for each loop and step, up to which delay it is stable by its poles, and by the runs."""
-        found = _Map(table)
-        rows: list[list[str]] = []
-        for loop in _LOOPS:
-            for step in _STEPS:
-                rest, unrest = (found.delays(loop, step, at_rest=at_rest) for at_rest in (True, False))
-                if rest or unrest:
-                    most = f"{1e3 * max(rest):.0f}" if rest else "none"
-                    least = f"{1e3 * min(unrest):.0f}" if unrest else "none"
-                    limit = _greatest_delay(loop) - _COUPLING_DELAYS * step
-                    rows.append([loop.label, f"{1e3 * step:g}", f"{1e3 * limit:.1f}", most, least])
-        header = [
-            "robot",
-            "communication step, ms",
-            "stable by its poles up to, ms",
-            "at rest up to, ms",
-            "not from, ms",
-        ]
+        found = _runs(table)
+        rows: list[dict[str, str]] = []
+        for loop, step in product(_LOOPS, _STEPS):
+            rest, unrest = _delays(found, loop, step)
+            if rest or unrest:
+                limit = _greatest_delay(*loop) - _COUPLING_DELAYS * step
+                rows.append({
+                    "robot": _label(loop),
+                    "communication step, ms": f"{1e3 * step:g}",
+                    "stable by its poles up to, ms": f"{1e3 * limit:.1f}",
+                    "at rest up to, ms": f"{1e3 * max(rest):.0f}" if rest else "none",
+                    "not from, ms": f"{1e3 * min(unrest):.0f}" if unrest else "none",
+                })  # fmt: skip
         note = (
             "Delay of the thrust's command that the loop tolerates where all units step in parallel: by the poles of "
             f"the controller's own loop, less {_COUPLING_DELAYS} communication steps, and by whether the robot comes "
             "to rest after a twist. Negative: not without delay either."
         )
-        return [ComparisonTable(title="Stability by step and delay", header=header, rows=rows, note=note)]
+        return [table_of("Stability by step and delay", rows, note)]
 
     def draw(self, table: CampaignTable, runs: Path, folder: Path) -> Sequence[Figure]:  # noqa: ARG002
         """Draw the map of each loop, with the poles' boundary."""
-        found = _Map(table)
-        shown = [loop for loop in _LOOPS if found.steps(loop)]
-        rows = (len(shown) + 1) // 2
-        if not shown:
-            return []
-        with figure(folder / "stability", rows, 2, size=(9.0, 0.6 + 2.9 * rows)) as panels:
-            for axis, loop in zip(panels, shown, strict=False):
-                for at_rest, mark, label in ((True, "o", "came to rest"), (False, "x", "did not")):
-                    points = [(1e3 * s, 1e3 * d) for s in _STEPS for d in found.delays(loop, s, at_rest=at_rest)]
-                    x, y = zip(*points, strict=True) if points else ((), ())
-                    axis.plot(x, y, mark, ms=5, color=COLOURS[0 if at_rest else 1], label=label)
-                tried = found.steps(loop)
-                steps = np.array([min(tried) - _BESIDE, max(tried) + _BESIDE])
-                limit = 1e3 * (_greatest_delay(loop) - _COUPLING_DELAYS * steps)
-                axis.plot(1e3 * steps, limit, color=COLOURS[5], lw=1.2, label="|z| = 1 by its poles")
-                most = 1e3 * max(_DELAYS[loop.behaviour])
-                axis.set(title=loop.label, xlim=(0.0, 17.0), ylim=(-0.04 * most, 1.04 * most))
-                axis.set(xlabel="communication step (ms)", ylabel="delay of the thrust (ms)")
-            for axis in panels[len(shown) :]:
-                axis.set_visible(False)
-            legend_below(panels[0])
+        found = _runs(table)
+        panels = [_panel(found, loop) for loop in _LOOPS if any(of[:2] == loop for of in found)]
         caption = (
             "Whether the robot comes to rest after a twist where all units step in parallel, by communication step and "
             "delay of the thrust, and where the largest pole of the controller's own loop is on the unit circle."
         )
-        return [Figure("stability", caption)]
+        rows = (len(panels) + 1) // 2
+        return drawn(folder / "stability", caption, panels, 2, size=(9.0, 0.6 + 2.9 * rows))
 
 
-class _Map:
-    """The runs by loop, step and delay, also those in which a unit failed: a motion that diverges ends so.
-
-    Attributes:
-        diverged: how many of them there are; they did not come to rest.
-        lost: runs of which nothing is known, since no worker came back with them.
-    """
-
-    def __init__(self, table: CampaignTable) -> None:
-        self._at_rest: dict[tuple[_Loop, float, float], bool] = {}
-        rows = [row for row in table.rows if row.get("parallel_step") is not None]
-        self.lost = sum(row["status"] == "lost" for row in rows)
-        self.diverged = sum(row["status"] == "failed" for row in rows)
-        for row in rows:
-            if row["status"] != "lost":
-                behaviour = Behaviour[str(row["behaviour"]).upper()]
-                loop = _Loop(behaviour, lags=row["propulsion"] == "limited")
-                key = loop, float(row["parallel_step"]), float(row["delay"])
-                self._at_rest[key] = is_done(row) and row.get("settling_time") is not None
-
-    def delays(self, loop: _Loop, step: float, *, at_rest: bool) -> list[float]:
-        """Return the delays at which the robot came to rest, or did not, s."""
-        return [d for (l, s, d), rests in self._at_rest.items() if (l, s) == (loop, step) and rests is at_rest]
-
-    def steps(self, loop: _Loop) -> set[float]:
-        """Return the communication steps that were tried, s."""
-        return {s for l, s, _ in self._at_rest if l == loop}
-
-    def compared(self) -> list[tuple[float, bool]]:
-        """Return the largest pole's |z| and whether the robot came to rest, for each run."""
-        return [(_pole_radius(l, d + _COUPLING_DELAYS * s), rests) for (l, s, d), rests in self._at_rest.items()]
+Run = tuple[Behaviour, bool, float, float, bool]
+"""Loop, communication step and delay, s, and whether the robot came to rest."""
 
 
-def _agrees(found: _Map) -> Claim:
-    facts: Mapping[str, Any] = {
-        "claim": "The robot comes to rest where its controller's poles say so, and nowhere else",
-        "published": "",
-        "beyond": True,
-    }
-    compared = found.compared()
-    clear = [(radius < 1.0, rests) for radius, rests in compared if abs(radius - 1.0) > _MARGIN]
-    near = [(radius < 1.0, rests) for radius, rests in compared if abs(radius - 1.0) <= _MARGIN]
-    if not clear:
-        return nothing_measured(**facts)
-    agree, stable = sum(said is rests for said, rests in clear), sum(said for said, _ in clear)
-    either = 0 < stable < len(clear)
-    return Claim(
-        **facts,
-        measured=f"{agree} of {len(clear)} runs, of which {stable} are stable by their poles; {len(near)} near the "
-        "unit circle left out",
-        verdict=verdict_of(agree == len(clear) and not found.lost, could_be_either=either),
-        reason=f"Holds if all do whose largest pole is more than {_MARGIN:g} from the unit circle. Nearer to it a run "
-        f"of half a minute cannot show its side: {len(near)} of {len(compared)} runs are left out, of which "
-        f"{sum(said is rests for said, rests in near)} agree. Runs that diverged until a unit failed, "
-        f"{found.diverged}, count as not at rest; {found.lost} were lost.",
-    )
+def _runs(table: CampaignTable) -> list[Run]:
+    """Return the runs of which something is known."""
+    return [
+        (
+            Behaviour[str(row["behaviour"]).upper()],
+            row["propulsion"] == "limited",
+            float(row["parallel_step"]),
+            float(row["delay"]),
+            is_done(row) and row.get("settling_time") is not None,
+        )
+        for row in table.rows
+        if row.get("parallel_step") is not None and row["status"] != "lost"
+    ]
 
 
-def _pole_radius(loop: _Loop, delay: float) -> float:
+def _delays(found: Sequence[Run], loop: Loop, step: float) -> tuple[list[float], list[float]]:
+    """Return the delays at which the robot came to rest, and those at which it did not, s."""
+    rest, unrest = ([of[3] for of in found if of[:3] == (*loop, step) and of[4] is rests] for rests in (True, False))
+    return rest, unrest
+
+
+def _panel(found: Sequence[Run], loop: Loop) -> Panel:
+    tried = [of for of in found if of[:2] == loop]
+    marks = [
+        Mark.through([(1e3 * of[2], 1e3 * of[3]) for of in tried if of[4] is rests], form, COLOURS[k], label)
+        for k, (rests, form, label) in enumerate(((True, "o", "came to rest"), (False, "x", "did not")))
+        if any(of[4] is rests for of in tried)
+    ]
+    steps = np.array([min(of[2] for of in tried) - _BESIDE, max(of[2] for of in tried) + _BESIDE])
+    limit = 1e3 * (_greatest_delay(*loop) - _COUPLING_DELAYS * steps)
+    most = 1e3 * max(_DELAYS[loop[0]])
+    axes = {"title": _label(loop), "xlabel": "communication step (ms)", "ylabel": "delay of the thrust (ms)"}
+    limits = {"xlim": (0.0, 17.0), "ylim": (-0.04 * most, 1.04 * most)}
+    return Panel([*marks, Mark(1e3 * steps, limit, label="|z| = 1 by its poles")], {**axes, **limits})
+
+
+def _pole_radius(behaviour: Behaviour, lags: bool, delay: float) -> float:
     """Return the largest |z| of the controller's loop with a delay, s, to the microsecond."""
-    lag = float(ThrustersParams().lag) if loop.lags else 0.0
-    return linear_loop(loop.behaviour, lag, round(delay, 6)).pole_radius
+    lag = float(ThrustersParams().lag) if lags else 0.0
+    return linear_loop(behaviour, lag, round(delay, 6)).pole_radius
 
 
 @cache
-def _greatest_delay(loop: _Loop) -> float:
+def _greatest_delay(behaviour: Behaviour, lags: bool) -> float:
     """Return about the largest delay with which the controller's loop is stable, s."""
-    return largest_stable(lambda delay: _pole_radius(loop, delay), upper=0.3, steps=12)
+    return largest_stable(lambda delay: _pole_radius(behaviour, lags, delay), upper=0.3, steps=12)

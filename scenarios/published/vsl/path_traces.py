@@ -12,7 +12,7 @@ from handover.controllers.vsl.hybrid_kinematics import Params as KinematicsParam
 from handover.controllers.vsl.kinematics import VslKinematics
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
-from handover.scenarios.published.figures import SOFT, Mark
+from handover.scenarios.published.figures import SOFT, Mark, records_of
 from handover.scenarios.published.runs import Row, is_done
 
 EQUAL: Any = {"aspect": "equal", "adjustable": "datalim"}
@@ -71,8 +71,7 @@ def trace_of(record: Record) -> PathTrace:
 
 def traces_of(runs: Path, names: Sequence[str]) -> list[PathTrace]:
     """Return the traces of runs, given by the names of their folders, of those that left a record."""
-    records = [runs / name / "signals.parquet" for name in names]
-    return [trace_of(Record(path)) for path in records if path.exists()]
+    return [trace_of(record) for record in records_of(names, runs)]
 
 
 @dataclass(frozen=True)

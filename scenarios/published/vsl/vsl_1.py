@@ -15,7 +15,7 @@ from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import COLOURS
 from handover.scenarios.published.figures import Mark, Panel, drawn
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment
-from handover.scenarios.published.runs import Point, Runs
+from handover.scenarios.published.runs import Point
 from handover.scenarios.published.tables import table_of
 from handover.scenarios.published.verdicts import without_verdict
 from handover.scenarios.published.vsl.path_traces import (
@@ -189,7 +189,7 @@ class Vsl1Runs:
     """Our results cell by cell, of what the campaign tries; a quick one leaves some out."""
 
     def __init__(self, table: CampaignTable) -> None:
-        tried = Runs.of_plan(table, Vsl1().plan(quick=False), lambda _: True)
+        tried = Vsl1().runs(table, keep=lambda _: True)
         self.done = tried.where(has_completed_path)
         self.loads = [name for name, load in LOADS.items() if len(tried.matching(load))]
         self.soft = [name for name, links in SOFT.items() if len(tried.matching(links))]

@@ -257,7 +257,7 @@ class Vsl2Runs:
     """Our results by case, method and arm, of runs that completed the path; and what of the plan any run is of."""
 
     def __init__(self, table: CampaignTable) -> None:
-        tried = Runs.of_plan(table, Vsl2().plan(quick=False), lambda _: True)
+        tried = Vsl2().runs(table, keep=lambda _: True)
         self._done = tried.where(has_completed_path)
         left = len(tried) - len(self._done)
         self.unfinished = f" {left} runs did not complete the path and do not count." if left else ""

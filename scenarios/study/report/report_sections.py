@@ -9,8 +9,7 @@ from markupsafe import Markup
 
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.free_flyer.parameters import Behaviour, Task
-from handover.scenarios.published.free_flyer.flyer_study_claims import published_failures
-from handover.scenarios.published.free_flyer.study_runs import STUDIED
+from handover.scenarios.published.free_flyer.handovers import STUDIED, published_failures
 from handover.scenarios.published.verdicts import format_interval, format_p_value, format_share
 from handover.scenarios.reporting.html import plot_html, rows_table
 from handover.scenarios.reporting.page import Section

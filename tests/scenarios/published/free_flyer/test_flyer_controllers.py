@@ -15,10 +15,9 @@ from handover.scenarios.published.free_flyer.flyer_controllers import (
     DISTURBANCES,
     FlyerControllers,
 )
-from handover.scenarios.published.free_flyer.variations import names_of
 from handover.scenarios.published.published_experiment import Claim, Verdict
 
-NUMBERS = names_of(DISTURBANCES)
+NUMBERS = {name for what in DISTURBANCES for name in what.parameters}
 LIMITS = ("impedance.f_max", "impedance.tau_max")
 
 

@@ -19,19 +19,18 @@ from handover.scenarios.execution.unit_values import split_parameters
 from handover.scenarios.free_flyer.handover.handovers import HandoverOfTask
 from handover.scenarios.free_flyer.parameters import Behaviour, Propulsion, Task
 from handover.scenarios.published.free_flyer.flyer_approaches import CASES, FlyerApproaches, places
-from handover.scenarios.published.free_flyer.flyer_handover import FlyerHandoverTable
-from handover.scenarios.published.free_flyer.flyer_handover_figures import figure_number
-from handover.scenarios.published.free_flyer.handover_runs import (
+from handover.scenarios.published.free_flyer.flyer_handover import (
     ARMS,
     AT_PUBLISHED_RATE,
-    EXCHANGES,
-    GIVING,
     RATES,
     STRENGTHS,
     UNGATED,
+    FlyerHandoverTable,
     HandoverRuns,
     point_of,
 )
+from handover.scenarios.published.free_flyer.flyer_handover_figures import figure_number
+from handover.scenarios.published.free_flyer.handovers import EXCHANGES, GIVING
 from handover.scenarios.published.published_experiment import Claim, Verdict
 
 NUMBERS = ("strength", "arm_factor", "model_arm_factor", "mass_factor", "inertia_factor", "decision.gate_error")
@@ -160,12 +159,12 @@ def test_a_full_plan_has_all_tables_with_all_rows(wording: Wording):
 def test_a_run_is_found_by_what_it_is_for():
     runs = HandoverRuns(table_of())
     for variation in (*STRENGTHS, *UNGATED, *RATES):
-        (first, *others) = runs.of(GIVING.task, Behaviour.RIGID, Propulsion.LIMITED, variation)
+        first, *others = runs.of(GIVING.task, Behaviour.RIGID, Propulsion.LIMITED, variation)
         assert len(others) == 2
         assert (first["gated"], first["decision"] != "") == (variation not in UNGATED, variation is RATES[1])
     assert len(runs.of(GIVING.task, Behaviour.RIGID)) == 3
     assert len(runs.usual()) == 72
-    assert not runs.of(Task.COLLABORATIVE, Behaviour.RIGID, variation=STRENGTHS[0])
+    assert len(runs.of(Task.COLLABORATIVE, Behaviour.RIGID, variation=STRENGTHS[0])) == 0
 
 
 @pytest.mark.slow
@@ -185,7 +184,7 @@ def test_runs_without_chance_do_not_depend_on_their_seed(tmp_path: Path):
 def test_without_records_there_are_no_curves(tmp_path: Path, sketches: Sketches):
     HAND_OVER.draw(table_of(), tmp_path, tmp_path)
     sketches.check("margins", "strength")
-    numbers = [n for e in EXCHANGES for b in Behaviour if (n := figure_number(e, b))]
+    numbers = [n for e in EXCHANGES for b in Behaviour if (n := figure_number(e.task, b))]
     assert (numbers[0], numbers[-1], len(numbers)) == ("figs. 4.29, 4.30", "figs. 4.37, 4.38", 5)
 
 

@@ -12,15 +12,10 @@ from support.sketched_figures import sketches as sketches
 
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.free_flyer.parameters import Axis, Behaviour, ImpedanceParameters, Wrench
-from handover.scenarios.published.free_flyer import flyer_impedance_figures
+from handover.scenarios.published.free_flyer import flyer_impedance
 from handover.scenarios.published.free_flyer.flyer_impedance import FlyerImpedanceTable
-from handover.scenarios.published.free_flyer.push_runs import (
-    PUSHES,
-    Push,
-    predicted_errors,
-    predicted_greatest,
-)
-from handover.scenarios.published.free_flyer.variations import EXACT
+from handover.scenarios.published.free_flyer.handovers import EXACT
+from handover.scenarios.published.free_flyer.linear_model import PUSHES, Push, predicted_errors, predicted_greatest
 from handover.scenarios.published.published_experiment import Claim, Verdict
 
 NUMBERS = ("duration", "mass_factor", "inertia_factor", "arm_factor", *EXACT)
@@ -105,6 +100,6 @@ def test_without_records_there_are_no_curves(tmp_path: Path, sketches: Sketches,
     def predicted(_push: Push, behaviour: Behaviour, _duration: float) -> float:
         return 1.0 + behaviour
 
-    monkeypatch.setattr(flyer_impedance_figures, "predicted_greatest", predicted)
+    monkeypatch.setattr(flyer_impedance, "predicted_greatest", predicted)
     FlyerImpedanceTable().draw(table_of(), tmp_path, tmp_path)
     sketches.check("ratio")

@@ -14,16 +14,15 @@ from support.sketched_figures import sketches as sketches
 from handover.plants.free_flyer.robot.navigation import Params
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.free_flyer.handover.person_evaluation import Cause
-from handover.scenarios.published.free_flyer.flyer_navigation import FlyerNavigation
-from handover.scenarios.published.free_flyer.navigation_runs import (
+from handover.scenarios.published.free_flyer.flyer_navigation import (
     DELAY,
     ESTIMATE_ERRORS,
     VARIATIONS,
     VELOCITY_BIAS,
+    FlyerNavigation,
     count_probability,
     rest_probability,
 )
-from handover.scenarios.published.free_flyer.variations import names_of
 from handover.scenarios.published.published_experiment import Claim, Verdict
 
 Run = Mapping[str, str]
@@ -67,7 +66,7 @@ def table_of(
         success = asks and not fails(given)
         row: dict[str, Any] = {"status": "done", "run": run.name, "success": success, "handed_over": float(success)}
         row |= {"task": given["task"], "behaviour": given["behaviour"], "saturated_share": 0.2}
-        row |= {name: float(given[name]) if name in given else None for name in names_of(VARIATIONS)}
+        row |= {name: float(given[name]) if name in given else None for v in VARIATIONS for name in v.parameters}
         row |= {"phase_signal": 20.0 if asks else None, "unprovoked": int(alone and number == 99) if asks else None}
         row |= {"transfer_displacement": 0.1 if asks else None, "transfer_time": 3.0 if success else None}
         rows.append(row | {"decided_by": int(Cause.NONE if success else Cause.OUT_OF_REACH)})

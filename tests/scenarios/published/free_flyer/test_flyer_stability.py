@@ -12,7 +12,7 @@ from support.sketched_figures import sketches as sketches
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.free_flyer.parameters import Behaviour
 from handover.scenarios.published.free_flyer.flyer_stability import FlyerStability
-from handover.scenarios.published.free_flyer.push_runs import linear_loop
+from handover.scenarios.published.free_flyer.linear_model import linear_loop
 from handover.scenarios.published.published_experiment import Verdict
 
 

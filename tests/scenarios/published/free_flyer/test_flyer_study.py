@@ -13,9 +13,9 @@ from support.sketched_figures import sketches as sketches
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.free_flyer.handover.person_evaluation import Cause
 from handover.scenarios.free_flyer.parameters import Behaviour, Task
-from handover.scenarios.published.free_flyer.flyer_study import FlyerStudy
-from handover.scenarios.published.free_flyer.study_runs import (
+from handover.scenarios.published.free_flyer.flyer_study import (
     TRAITS,
+    FlyerStudy,
     StudyRuns,
     paired,
     participants,
@@ -75,7 +75,7 @@ def test_both_behaviours_share_the_seeds_of_a_participants_trials_and_nobody_els
 def test_a_participants_trials_are_told_from_those_of_a_skill():
     runs = StudyRuns(table_of())
     assert len(runs.of_participants(Task.ROBOT_TO_HUMAN, Behaviour.RIGID)) == 200
-    assert len(runs.of_participants(Task.ROBOT_TO_HUMAN, Behaviour.RIGID, 3)) == 20
+    assert len(runs.by_participant(Task.ROBOT_TO_HUMAN, Behaviour.RIGID)[3]) == 20
     assert len(runs.of_skill(0.5, Task.COLLABORATIVE, Behaviour.COMPLIANT)) == 20
 
 
