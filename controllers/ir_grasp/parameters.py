@@ -120,17 +120,19 @@ class Params:
     """
 
     strategy: Strategy = parameter(
-        Strategy.REFLEX, "correct by the sensors, close as is, or go forward and close", origin=stated("algorithm 1")
+        Strategy.REFLEX,
+        "correct the pre-grasp pose by the sensors, close there at once, or go forward and close",
+        origin=stated("table I compares IR-guided and blind; closing after going forward is a control of our own"),
     )
     correction: Correction = parameter(
         Correction.PAPER,
-        "algorithm 1 at rest, or continuously on the move",
-        origin=stated("algorithm 1; a correction on the move is our own"),
+        "correct by algorithm 1, moves and readings at rest, or continuously, on the move",
+        origin=stated("algorithm 1; fast is our own"),
     )
     literal: bool = parameter(
         False,
-        "eqs. (4) and (9) as printed: no target distance, no scaling, no damping",
-        origin=assumed("see scenario.literal"),
+        "eqs. (4) and (9) of [Luberto] as printed: no target distance, no scaling, no damping",
+        origin=assumed("eq. (9) has no inverse with fewer residuals than inputs, and eq. (4) is least at contact"),
     )
     p_WH_pregrasp: Vector2[Metre] = parameter(
         np.array([-0.20, 0.0]),

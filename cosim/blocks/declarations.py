@@ -37,7 +37,8 @@ def declared_variables(owner: type[Any], causality: Causality, block: str = "") 
     """
     hints = typing.get_type_hints(owner, include_extras=True)
     owner_name = f"{block}: {owner.__name__}" if block else owner.__name__
-    return tuple(_variable(owner_name, f, hints[f.name], causality) for f in dataclasses.fields(owner))
+    fields = dataclasses.fields(owner)
+    return tuple(_variable(owner_name, f, f.metadata.get("type", hints[f.name]), causality) for f in fields)
 
 
 def _variable(owner: str, field: "dataclasses.Field[Any]", hint: Any, causality: Causality) -> Variable:

@@ -168,13 +168,13 @@ def parameter(
     Bounds are inclusive and hold for every entry of an array. The origin says where the default comes from.
     """
     d = Declaration(description=description, start=default, minimum=minimum, maximum=maximum, origin=origin)
-    return _field_with_default(default, d)
+    return declared_field(d)
 
 
 def port(start: T, description: str, *, minimum: float | None = None, maximum: float | None = None) -> T:
     """Declare an input, as the default of a dataclass field; `start` is its value while nothing is connected."""
     d = Declaration(description=description, start=start, minimum=minimum, maximum=maximum)
-    return _field_with_default(start, d)
+    return declared_field(d)
 
 
 def output(description: str, *, minimum: float | None = None, maximum: float | None = None) -> Any:
@@ -183,8 +183,9 @@ def output(description: str, *, minimum: float | None = None, maximum: float | N
     return field(metadata={"declaration": d})
 
 
-def _field_with_default(default: T, declaration: Declaration) -> T:
-    metadata = {"declaration": declaration}
+def declared_field(declaration: Declaration, **metadata: Any) -> Any:
+    """Return a dataclass field of a declaration, with its start value as the default, and more metadata."""
+    default, metadata = declaration.start, {"declaration": declaration, **metadata}
     if isinstance(default, np.ndarray):
         dtype = np.uint8 if default.dtype == np.uint8 else np.float64
         array = np.asarray(default, dtype=dtype)
@@ -193,5 +194,4 @@ def _field_with_default(default: T, declaration: Declaration) -> T:
             return np.array(array)
 
         return field(default_factory=copy, metadata=metadata)
-    declared: T = field(default=default, metadata=metadata)
-    return declared
+    return field(default=default, metadata=metadata)

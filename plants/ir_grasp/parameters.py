@@ -77,7 +77,9 @@ class Params:
     """
 
     thing: Thing = parameter(
-        Thing.CYLINDER, "what stands on the table, in which reference pose", origin=stated("see scenario.thing")
+        Thing.CYLINDER,
+        "what stands on the table, in which reference pose",
+        origin=stated("tables I and II have a cylinder, a baby cup and a paper box, the latter two in two poses"),
     )
     disc_radius: Metre = parameter(
         0.033, "radius of thing=disc", minimum=5e-3, maximum=0.1, origin=assumed("a test of our own; the cylinder's")
@@ -91,7 +93,7 @@ class Params:
     )
     corners: Corners8[Metre] = parameter(
         PENTAGON,
-        "corners of thing=polygon, counter-clockwise; the first corner_count count",
+        "corners of thing=polygon, counter-clockwise: the first corner_count, the rest may be 0",
         minimum=-0.2,
         maximum=0.2,
         origin=_OWN_TEST,
@@ -103,7 +105,12 @@ class Params:
         maximum=8,
         origin=_OWN_TEST,
     )
-    thing_seed: int = parameter(0, "which object of its family thing=drawn is", minimum=0, origin=_OWN_TEST)
+    thing_seed: int = parameter(
+        0,
+        "which object of its family thing=drawn is; odd ones are kept from all tuning",
+        minimum=0,
+        origin=_OWN_TEST,
+    )
     p_WO_0: Vector2[Metre] = parameter(
         np.array([0.0, 0.0]), "where it stands at the start, in the world", minimum=-2.0, maximum=2.0, origin=_DRAWN
     )
@@ -151,7 +158,7 @@ class Params:
     carry_until: Second = parameter(12.0, "when it stops", minimum=0.0, maximum=600.0, origin=_OWN_TEST)
     nudge: Vector2[Metre] = parameter(
         np.zeros(2),
-        "how far a bump takes the object along, if nothing holds it",
+        "how far somebody bumps the object along, in the world, if nothing holds it",
         minimum=-0.2,
         maximum=0.2,
         origin=assumed("fig. 3b has an unexpected motion of the object; its size is not given"),
@@ -326,14 +333,14 @@ class Params:
     )
     other_radius: Metre = parameter(
         0.0,
-        "radius of a second object, a disc; 0: none",
+        "radius of a second object on the table, a disc; 0: none",
         minimum=0.0,
         maximum=0.1,
         origin=_OWN_TEST,
     )
     p_WX_0: Vector2[Metre] = parameter(
         np.array([0.0, 0.12]),
-        "where the second object stands at the start",
+        "where the second object stands at the start, in the world",
         minimum=-2.0,
         maximum=2.0,
         origin=_OWN_TEST,

@@ -11,6 +11,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
 from fractions import Fraction
+from functools import wraps
 from inspect import getattr_static
 from pathlib import Path
 from types import FunctionType
@@ -24,6 +25,7 @@ from handover.cosim.blocks.variable import Causality, Variable
 from handover.cosim.record.reader import Record
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PlacedUnit, System
+from handover.scenarios.experiment.exposed import carry, with_exposed
 from handover.scenarios.experiment.live_inputs import HandHint, LedHand, Pushable
 from handover.scenarios.experiment.paper import PublishedValue
 from handover.scenarios.experiment.pictures import CameraPicture
@@ -237,6 +239,9 @@ class Experiment(abc.ABC, Generic[AnyEvaluator]):
     def __init_subclass__(cls, **given: Any) -> None:
         super().__init_subclass__(**given)
         check_methods(cls, Experiment, _OF_SCENARIOS)
+        if isinstance(build := vars(cls).get("build"), FunctionType):
+            type.__setattr__(cls, "build", _carrying(build))
+        cls.places = with_exposed(cls.places, cls.parameters_type)
         if "name" not in vars(cls):
             cls.name = re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", cls.__name__).lower()
         if "title" not in vars(cls) and vars(cls).get("__doc__"):
@@ -369,6 +374,16 @@ class Experiment(abc.ABC, Generic[AnyEvaluator]):
     def published(self, parameters: Any) -> Sequence[PublishedValue]:  # noqa: ARG002
         """Return what the paper published of runs with such parameters; nothing by default."""
         return ()
+
+
+def _carrying(build: Callable[..., System]) -> Callable[..., System]:
+    """Let `build` return a system whose units have the values of exposed parameters."""
+
+    @wraps(build)
+    def carried(self: Any, parameters: Any, *args: Any, **given: Any) -> System:
+        return carry(parameters, build(self, parameters, *args, **given))
+
+    return carried
 
 
 def _is_step(value: object) -> bool:

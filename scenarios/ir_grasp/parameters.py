@@ -11,14 +11,16 @@ from pathlib import Path
 import numpy as np
 
 from handover.controllers.ir_grasp.parameters import Correction, Strategy
+from handover.controllers.ir_grasp.parameters import Params as Reflex
 from handover.cosim.blocks.origins import assumed, stated
-from handover.cosim.blocks.ports import Corners8, Floats, Vector2, parameter
-from handover.cosim.blocks.units import Metre, MetrePerSecond, Radian, Second
+from handover.cosim.blocks.ports import Floats, Vector2, parameter
+from handover.cosim.blocks.units import Metre, MetrePerSecond, Radian
 from handover.cosim.record.reader import Record
 from handover.plants.ir_grasp.hand import PALM
 from handover.plants.ir_grasp.objects import Solid, Thing, placed, polygon_corners, solid_of
-from handover.plants.ir_grasp.parameters import PENTAGON
+from handover.plants.ir_grasp.parameters import Params as Scene
 from handover.plants.ir_grasp.shapes import polygon_faults
+from handover.scenarios.experiment.exposed import expose
 
 _OWN_TEST = assumed("a test of our own; not in the paper")
 
@@ -35,41 +37,12 @@ class Expected(enum.IntEnum):
 class Parameters:
     """One grasp. The run's seed draws the perturbation and what vision is off by, the same for any strategy."""
 
-    thing: Thing = parameter(
-        Thing.CYLINDER,
-        "what is grasped, in which reference pose",
-        origin=stated("tables I and II have a cylinder, a baby cup and a paper box, the latter two in two poses"),
-    )
-    disc_radius: Metre = parameter(
-        0.033, "radius of thing=disc", minimum=5e-3, maximum=0.1, origin=assumed("a test of our own; the cylinder's")
-    )
-    bar_size: Vector2[Metre] = parameter(
-        np.array([0.11, 0.03]),
-        "length and width of thing=bar",
-        minimum=5e-3,
-        maximum=0.3,
-        origin=_OWN_TEST,
-    )
-    corners: Corners8[Metre] = parameter(
-        PENTAGON,
-        "corners of thing=polygon, counter-clockwise: the first corner_count, the rest may be 0",
-        minimum=-0.2,
-        maximum=0.2,
-        origin=_OWN_TEST,
-    )
-    corner_count: int = parameter(
-        5,
-        "how many corners thing=polygon has",
-        minimum=3,
-        maximum=8,
-        origin=_OWN_TEST,
-    )
-    thing_seed: int = parameter(
-        0,
-        "which object of its family thing=drawn is; odd ones are kept from all tuning",
-        minimum=0,
-        origin=_OWN_TEST,
-    )
+    thing: Thing = expose(Scene, "scene.thing")
+    disc_radius: float = expose(Scene, "scene.disc_radius")
+    bar_size: Floats = expose(Scene, "scene.bar_size")
+    corners: Floats = expose(Scene, "scene.corners")
+    corner_count: int = expose(Scene, "scene.corner_count")
+    thing_seed: int = expose(Scene, "scene.thing_seed")
     expected: Expected = parameter(
         Expected.AS_IT_IS,
         "the shape that vision takes the object for",
@@ -99,27 +72,9 @@ class Parameters:
     perturbed: bool = parameter(
         True, "the object was moved after vision saw it", origin=stated("table I has nominal and perturbed poses")
     )
-    strategy: Strategy = parameter(
-        Strategy.REFLEX,
-        "correct the pre-grasp pose by the sensors, close there at once, or go forward and close",
-        origin=stated("table I compares IR-guided and blind; closing after going forward is a control of our own"),
-    )
-    forward: Metre = parameter(
-        0.035,
-        "how far forward, for that strategy",
-        minimum=0.0,
-        maximum=0.3,
-        origin=assumed(
-            "a control of our own: about as far forward as the reflex goes in nominal poses (31 mm; held "
-            "as the reflex in nominal poses, less in perturbed ones; with 55 mm nearly as the reflex in "
-            "both)"
-        ),
-    )
-    correction: Correction = parameter(
-        Correction.PAPER,
-        "correct by algorithm 1, moves and readings at rest, or continuously, on the move",
-        origin=stated("algorithm 1; fast is our own"),
-    )
+    strategy: Strategy = expose(Reflex, "reflex.strategy")
+    forward: float = expose(Reflex, "reflex.forward_distance", maximum=0.3)
+    correction: Correction = expose(Reflex, "reflex.correction")
     last_grasp: str = parameter(
         "",
         "folder of an earlier run, whose estimated Jacobian correction=fast begins with; empty: the hand's design",
@@ -129,11 +84,7 @@ class Parameters:
             "design leaves open"
         ),
     )
-    literal: bool = parameter(
-        False,
-        "the correction's equations as printed: [Luberto] eqs. (4) and (9)",
-        origin=assumed("eq. (9) has no inverse with fewer residuals than inputs, and eq. (4) is least at contact"),
-    )
+    literal: bool = expose(Reflex, "reflex.literal")
     standoff: Metre = parameter(
         0.07,
         "gap between palm and object at the pre-grasp pose that vision asks for",
@@ -209,32 +160,12 @@ class Parameters:
         maximum=math.pi,
         origin=_OWN_TEST,
     )
-    carried_from: Second = parameter(0.0, "when it begins to carry", minimum=0.0, maximum=90.0, origin=_OWN_TEST)
-    carried_until: Second = parameter(12.0, "when it stops", minimum=0.0, maximum=90.0, origin=_OWN_TEST)
-    nudge: Vector2[Metre] = parameter(
-        np.zeros(2),
-        "how far somebody bumps the object meanwhile, in W",
-        minimum=-0.1,
-        maximum=0.1,
-        origin=assumed("fig. 3b has an unexpected motion of the object; its size is not given"),
-    )
-    nudge_time: Second = parameter(
-        4.0, "when the bump begins", minimum=0.0, maximum=90.0, origin=assumed("not given; while the reflex probes")
-    )
-    other_radius: Metre = parameter(
-        0.0,
-        "radius of a second object on the table, a disc; 0: none",
-        minimum=0.0,
-        maximum=0.1,
-        origin=_OWN_TEST,
-    )
-    other_place: Vector2[Metre] = parameter(
-        np.array([0.0, 0.12]),
-        "where the second object stands, in W",
-        minimum=-2.0,
-        maximum=2.0,
-        origin=_OWN_TEST,
-    )
+    carried_from: float = expose(Scene, "scene.carry_from", maximum=90.0)
+    carried_until: float = expose(Scene, "scene.carry_until", maximum=90.0)
+    nudge: Floats = expose(Scene, "scene.nudge", minimum=-0.1, maximum=0.1)
+    nudge_time: float = expose(Scene, "scene.nudge_time", maximum=90.0)
+    other_radius: float = expose(Scene, "scene.other_radius")
+    other_place: Floats = expose(Scene, "scene.p_WX_0")
     vision_position: Metre = parameter(
         0.003,
         "standard deviation of the pre-grasp position, by axis",

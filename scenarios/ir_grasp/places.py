@@ -6,7 +6,6 @@ _TABLE = (
     "The scene is planar, seen from above: W lies on the table, with its origin where vision saw the object; headings "
     "turn counter-clockwise from x of W, and the hand points along its heading."
 )
-_OWN = "the scenario's parameter"
 _HAND = {"p_WH": "in W", "yaw": "counter-clockwise from x of W", "sigma": ""}
 _COMMAND = {
     "p_WH_cmd": "in W; the hand goes there at its own speed",
@@ -62,14 +61,7 @@ PLACES = {
             "q_meas": "felt by strategy=contact and correction=fast",
             "tension_meas": "felt by strategy=contact and correction=fast",
             "carry_velocity": "in W; by carried_speed and carried_direction",
-            "carry_from": "the scenario's parameter carried_from",
-            "carry_until": "the scenario's parameter carried_until",
             "p_WX": "shown in space",
-            **dict.fromkeys(("disc_radius", "bar_size", "corners", "corner_count", "thing_seed"), _OWN),
-            "other_radius": "the scenario's parameter",
-            "p_WX_0": "the scenario's parameter other_place",
-            "nudge": "the scenario's parameter, in W",
-            "nudge_time": "the scenario's parameter",
             "seed": "follows from the run's seed",
         },
         remarks=(_TABLE,),
@@ -90,10 +82,6 @@ PLACES = {
             "steps": "a metric",
             "stop": "a metric, and part of the verdict's reason",
             "jacobian_offset": "what a later run begins with by last_grasp",
-            "strategy": "the scenario's parameter",
-            "forward_distance": "the scenario's parameter forward",
-            "literal": "the scenario's parameter",
-            "correction": "the scenario's parameter",
             "jacobian_offset_0": "zeros, or of the run that the scenario's parameter last_grasp names",
             "p_WH_pregrasp": "in W; by vision",
             "yaw_pregrasp": "counter-clockwise from x of W; by vision",

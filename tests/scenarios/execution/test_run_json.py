@@ -30,7 +30,7 @@ def test_a_scenario_says_how_it_is_presented_and_wired():
     assert found["headline"] == list(IrGrasp.headline)
     names = [name for name, _, _ in found["told_parameters"]]
     assert names == [v.name for v in IrGrasp.parameters()]
-    assert ["forward", "0.035 m", "how far forward, for that strategy"] in found["told_parameters"]
+    assert ["forward", "0.035 m", "how far the strategy FORWARD goes before it closes"] in found["told_parameters"]
     assert found["told_parameters"][0][1] == IrGrasp.parameters_type().thing.name.lower()
     assert found["system"]["units"] == [
         {"name": "scene", "model": "GraspScene", "fmi": "3", "period": 0.015, "sampled": False},

@@ -1,0 +1,88 @@
+"""Parameters of a scenario that are parameters of its units: declared by the unit, exposed by the scenario.
+
+`light: float = expose(CameraParams, "camera.light")` takes type, unit of measurement, default, range, text and origin
+from the unit's declaration, and `carry` gives the scenario's value to `camera`. What an experiment has otherwise, such
+as another default with its origin, is said beside the path.
+"""
+
+import functools
+import typing
+from collections.abc import Iterator, Mapping
+from dataclasses import fields, is_dataclass, replace
+from typing import Any
+
+from handover.cosim.blocks.declarations import DeclarationError
+from handover.cosim.blocks.origins import Origin
+from handover.cosim.blocks.ports import declared_field
+from handover.cosim.system.system import System
+from handover.scenarios.experiment.places import Place
+
+_BY_SCENARIO = "the scenario's parameter"
+
+
+def expose(
+    params: type[Any],
+    *paths: str,
+    start: Any = None,
+    origin: Origin | None = None,
+    minimum: float | None = None,
+    maximum: float | None = None,
+    description: str = "",
+) -> Any:
+    """Declare a scenario's parameter, as the default of a dataclass field, by that of a unit.
+
+    Args:
+        params: where the unit declares it.
+        paths: `UNIT.NAME` of each parameter that gets the value, UNIT being the unit's name in the system; the first
+            one's NAME is that in `params`.
+        start: the scenario's own default.
+        origin: of that.
+        minimum: the scenario's own lower bound.
+        maximum: its own upper bound.
+        description: the scenario's own text.
+
+    Raises:
+        DeclarationError: `params` does not declare it.
+    """
+    name = paths[0].partition(".")[2]
+    metadata = next((f.metadata for f in fields(params) if f.name == name), {})
+    if "declaration" not in metadata:
+        raise DeclarationError(params.__name__, name, "it cannot be exposed, as it is not declared")
+    own = {"origin": origin, "minimum": minimum, "maximum": maximum, "description": description or None, "start": start}
+    declaration = replace(metadata["declaration"], **{k: v for k, v in own.items() if v is not None})
+    hint = metadata.get("type", _hints(params)[name])
+    return declared_field(declaration, type=hint, exposes=paths)
+
+
+@functools.cache
+def _hints(params: type[Any]) -> dict[str, Any]:
+    return typing.get_type_hints(params, include_extras=True)
+
+
+def exposed(parameters: Any) -> Iterator[tuple[str, str, str]]:
+    """Yield of a class of parameters, or an instance, each name, and unit and name of what gets the value."""
+    if is_dataclass(parameters):
+        for f in fields(parameters):
+            for path in f.metadata.get("exposes", ()):
+                unit, _, name = path.partition(".")
+                yield f.name, unit, name
+
+
+def carry(parameters: Any, system: System) -> System:
+    """Return a system after giving its units the values of exposed parameters, but where they are set to others."""
+    values: dict[str, dict[str, Any]] = {}
+    for own, unit, name in exposed(parameters):
+        values.setdefault(unit, {})[name] = getattr(parameters, own)
+    for unit in values.keys() & system.units.keys():
+        placed = system.units[unit]
+        system.units[unit] = replace(placed, start={**values[unit], **placed.start})
+    return system
+
+
+def with_exposed(places: Mapping[str, Place], parameters: type[Any]) -> Mapping[str, Place]:
+    """Return places whose units may have the parameters that the scenario exposes."""
+    for own, unit, name in exposed(parameters):
+        if unit in places and name not in {**(place := places[unit]).required, **place.optional}:
+            text = _BY_SCENARIO if own == name else f"{_BY_SCENARIO} {own}"
+            places = {**places, unit: replace(place, optional={**place.optional, name: text})}
+    return places
