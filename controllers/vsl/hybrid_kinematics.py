@@ -86,7 +86,7 @@ class Params:
     method: Method = parameter(Method.HYBRID, "rigid kinematics, with what was learned, or with its estimate only")
     learned: Learned = parameter(
         Learned.CUBIC,
-        "what corrects rigid kinematics",
+        "what corrects: polynomials, a small network, the paper's, which needs a model, or a beam",
         origin=assumed("sec. IV-B has networks; polynomials of third degree learn the same from fewer points"),
     )
     model: str = parameter(

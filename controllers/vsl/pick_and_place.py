@@ -44,65 +44,75 @@ class Params:
 
     p_WP: Vector3[Metre] = parameter(
         np.array([0.30, 0.0, 0.06]),
-        "where the tip picks the object up, in the world",
+        "where the tip picks the object up, at its top, in the world",
         minimum=-10.0,
         maximum=10.0,
-        origin=assumed("as scenario pick"),
+        origin=assumed(
+            "where the curve of sec. V-A begins, on an object of some centimetres; no such experiment is published"
+        ),
     )
     p_WQ: Vector3[Metre] = parameter(
         np.array([0.36, 0.0, 0.06]),
-        "where the tip puts it down, in the world",
+        "where the tip puts it down, in the world; as high as it stood",
         minimum=-10.0,
         maximum=10.0,
-        origin=assumed("as scenario place"),
+        origin=assumed("farther out, where the arm sags more"),
     )
     hover: Metre = parameter(
-        0.08, "how far above both it travels", minimum=0.0, maximum=1.0, origin=assumed("as scenario hover")
+        0.08,
+        "how far above both it travels",
+        minimum=0.0,
+        maximum=1.0,
+        origin=assumed("clear of the object by more than what the arm sags, and swings, as it turns soft"),
     )
     press: Metre = parameter(
         0.008,
         "how far below both it is commanded, to touch for certain",
         minimum=0.0,
         maximum=0.1,
-        origin=assumed("as scenario press"),
+        origin=assumed("more than the error of the corrected tip, so that it touches for certain"),
     )
     V: MetrePerSecond = parameter(
         0.1,
         "speed of the tip while it lifts and carries",
         minimum=1e-3,
         maximum=2.0,
-        origin=assumed("as scenario speed"),
+        origin=assumed("twice that of the paths"),
     )
     V_contact: MetrePerSecond = parameter(
         0.03,
         "speed of the tip while it comes down",
         minimum=1e-3,
         maximum=2.0,
-        origin=assumed("as scenario contact_speed"),
+        origin=assumed("slow; speeds are not given"),
     )
     p_contact: Pascal = parameter(
         5e4,
-        "pressure of both links near contacts",
+        "pressure of both links near contacts: 5e4 Pa is 0.5 bar",
         minimum=0.0,
         maximum=3e5,
-        origin=assumed("as scenario contact_pressure"),
+        origin=assumed("0.5 bar, the softest of sec. V-C"),
     )
     p_carry: Pascal = parameter(
         2e5,
         "pressure of both links while it lifts and carries",
         minimum=0.0,
         maximum=3e5,
-        origin=assumed("as scenario carry_pressure"),
+        origin=assumed("2 bar, the stiffest of sec. V-C"),
     )
     settle: Second = parameter(
         4.0,
         "time above the object before it comes down",
         minimum=0.0,
         maximum=600.0,
-        origin=assumed("as scenario settle"),
+        origin=assumed("as for the paths, a second less: the arm starts nearby"),
     )
     wait: Second = parameter(
-        1.5, "time for pressures and the cup to follow", minimum=0.0, maximum=600.0, origin=assumed("as scenario wait")
+        1.5,
+        "time for pressures and the cup to follow",
+        minimum=0.0,
+        maximum=600.0,
+        origin=assumed("six times the regulator's time constant"),
     )
     qd_0: Vector3[RadianPerSecond] = parameter(
         np.full(3, 0.8),

@@ -14,7 +14,7 @@ from handover.controllers.vsl.kinematics import Elbow, VslKinematics, format_poi
 from handover.controllers.vsl.paths import Path, Segment, segments_of
 from handover.controllers.vsl.waypoints import InvalidWaypoints, read_waypoints
 from handover.cosim.blocks.block import InvalidParameters
-from handover.cosim.blocks.origins import assumed
+from handover.cosim.blocks.origins import assumed, read_off, stated
 from handover.cosim.blocks.ports import Floats, Vector2, Vector3, output, parameter, port
 from handover.cosim.blocks.schedule import InvalidSchedule, Schedule
 from handover.cosim.blocks.start_values import parameter_faults
@@ -43,25 +43,44 @@ class InvalidPath(InvalidParameters):
 class Params:
     """Path and speed. [Gandarias2020] states neither the arm's lengths nor speeds: they are assumed."""
 
-    path: Path = parameter(Path.CURVE, "path: of the paper, or (CUSTOM) straight from x_0 to x_g, or by waypoints")
+    path: Path = parameter(
+        Path.CURVE,
+        "path of the tip: of the paper, or (CUSTOM) a straight line from x_0 to x_g, or by waypoints",
+        origin=stated("sec. V-B: the path of experiment 2; sec. V-A has linear, curve and square"),
+    )
     waypoints: str = parameter(
         "",
-        "CSV file of a CUSTOM path's waypoints in the world: columns x, y, z, and via_x, via_y, via_z for arcs; empty: "
-        "x_0 and x_g",
+        "CSV file of a CUSTOM path's waypoints in the world, m: columns x, y, z, and via_x, via_y, via_z for arcs; "
+        "empty: x_0 and x_g",
+        origin=assumed("the paper's paths are given in sec. V-A; this is for one's own"),
     )
-    x_0: Vector3[Metre] = parameter(np.array([0.3, 0.0, 0.05]), "first point of a CUSTOM path in the world")
-    x_g: Vector3[Metre] = parameter(np.array([0.3, 0.0, 0.35]), "last point of a CUSTOM path in the world")
+    x_0: Vector3[Metre] = parameter(
+        np.array([0.3, 0.0, 0.05]),
+        "first point of a CUSTOM path in the world, z at least 0",
+        origin=assumed("start of a path of one's own; the paper's curve starts there"),
+    )
+    x_g: Vector3[Metre] = parameter(
+        np.array([0.3, 0.0, 0.35]), "last point of a CUSTOM path in the world, z at least 0"
+    )
     N: int = parameter(
         100,
-        "points in each segment after its first",
+        "points of each segment of the path, N",
         minimum=1,
         maximum=10000,
-        origin=assumed("algorithms 1 and 2, not given"),
+        origin=assumed("N of algorithms 1 and 2 is not given; steps of 1 to 3 mm"),
     )
     V: MetrePerSecond = parameter(
-        0.05, "speed along the path", minimum=1e-4, maximum=2.0, origin=assumed("algorithms 1 and 2, not given")
+        0.05,
+        "speed of the tip along the path, V",
+        minimum=1e-4,
+        maximum=2.0,
+        origin=assumed("V of algorithms 1 and 2 is not given"),
     )
-    elbow: Elbow = parameter(Elbow.UP, "which way the elbow points")
+    elbow: Elbow = parameter(
+        Elbow.UP,
+        "which way the elbow points; down, it is below the ground on the paper's paths",
+        origin=read_off("fig. 1(a) shows the elbow above the line from shoulder to tip"),
+    )
     L_1: Metre = parameter(
         0.15,
         "height of the shoulder",

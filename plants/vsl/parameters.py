@@ -71,7 +71,11 @@ class Params:
     The values are chosen so that the tip of the arm errs by about what [Gandarias2020] fig. 5 shows.
     """
 
-    motion: Motion = parameter(Motion.QUASI_STATIC, "whether the arm swings, or is at rest at every instant")
+    motion: Motion = parameter(
+        Motion.QUASI_STATIC,
+        "whether the arm swings, or is at rest at every instant",
+        origin=assumed("slow point-to-point motion; the paper's figures show no oscillation"),
+    )
     link_2: Link = parameter(Link.VSL, "what the link from shoulder to elbow is made of")
     link_3: Link = parameter(Link.VSL, "what the link behind the elbow is made of")
     link_4: Link = parameter(

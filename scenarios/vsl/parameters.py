@@ -8,16 +8,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from handover.controllers.vsl.hybrid_kinematics import Imu
+from handover.controllers.vsl.hybrid_kinematics import Params as Kinematics
 from handover.controllers.vsl.kinematics import format_point
 from handover.controllers.vsl.learned_model import Learned
 from handover.controllers.vsl.paths import Segment
 from handover.controllers.vsl.trajectory_planner import Elbow, Path, segments_by
+from handover.controllers.vsl.trajectory_planner import Params as Planner
 from handover.controllers.vsl.waypoints import InvalidWaypoints
-from handover.cosim.blocks.origins import assumed, read_off, stated
-from handover.cosim.blocks.ports import Floats, Vector3, parameter
+from handover.cosim.blocks.origins import assumed, stated
+from handover.cosim.blocks.ports import Floats, parameter
 from handover.cosim.blocks.schedule import InvalidSchedule, Schedule
-from handover.cosim.blocks.units import Kilogram, Metre, MetrePerSecond, Number, Pascal, Second
+from handover.cosim.blocks.units import Kilogram, Metre, Number, Pascal
 from handover.plants.vsl.parameters import MAX_PRESSURE, Link, Motion
+from handover.plants.vsl.parameters import Params as ArmParams
+from handover.scenarios.experiment.exposed import expose
 
 _ONE_ARM = assumed("one arm was built; others are of one's own")
 
@@ -69,17 +73,8 @@ REGULATOR_STEP = MAX_PRESSURE / 255.0
 class Parameters:
     """One run along a path, controlled by rigid-link kinematics."""
 
-    path: Path = parameter(
-        Path.CURVE,
-        "path of the tip; custom is a straight line from x_0 to x_g, or by waypoints",
-        origin=stated("sec. V-B: the path of experiment 2; sec. V-A has linear, curve and square"),
-    )
-    waypoints: str = parameter(
-        "",
-        "CSV file of a custom path's waypoints in W, m: columns x, y, z, and via_x, via_y, via_z for arcs; empty: x_0 "
-        "and x_g",
-        origin=assumed("the paper's paths are given in sec. V-A; this is for one's own"),
-    )
+    path: Path = expose(Planner, "planner.path")
+    waypoints: str = expose(Planner, "planner.waypoints")
     load: Kilogram = parameter(
         0.075,
         "mass that hangs at the gripper; the paper's are 0 to 0.1 kg",
@@ -87,11 +82,7 @@ class Parameters:
         maximum=_MAX_LOAD,
         origin=stated("sec. V-C: 75 g with 0.5 bar, the harder case of experiment 2"),
     )
-    load_steps: str = parameter(
-        "",
-        "masses, kg, that hang there from some times on, s, in place of load, as '8:0.05 12:0'; empty: none",
-        origin=assumed("the paper's loads hang throughout a path"),
-    )
+    load_steps: str = expose(ArmParams, "arm.load_steps")
     pressure: Pascal = parameter(
         5e4,
         "pressure inside both links: 5e4 Pa is 0.5 bar; the paper's are 0.5 to 2 bar",
@@ -106,64 +97,34 @@ class Parameters:
         maximum=MAX_PRESSURE,
         origin=assumed("sec. V-C names one pressure for both links"),
     )
-    pressure_steps: str = parameter(
-        "",
-        "pressures, Pa, from some times on, s, of both links or each, as '8:1e5 12:5e4,2e5'; empty: none",
-        origin=assumed("the paper's pressures hold throughout a path"),
-    )
+    pressure_steps: str = expose(Planner, "planner.pressure_steps")
     links: Links = parameter(
         Links.VSL,
         "links of variable stiffness, printed rigid ones of the same length, or one of each, link 2 first",
         origin=stated("sec. II-A: links can be exchanged with printed rigid ones of the same weight"),
     )
-    motion: Motion = parameter(
-        Motion.QUASI_STATIC,
-        "arm in equilibrium at every instant, or with its oscillations",
-        origin=assumed("slow point-to-point motion; the paper's figures show no oscillation"),
-    )
+    motion: Motion = expose(ArmParams, "arm.motion")
     resolution: Resolution = parameter(
         Resolution.IDEAL,
         "ideal, or the robot's electronics: a stepper at the base, counts of encoders, 16 and 8 bits for pressures",
         origin=assumed("sec. II-B names converters, but neither ranges nor steps; errors of the figures are larger"),
     )
-    speed: MetrePerSecond = parameter(
-        0.05,
-        "speed of the tip along the path, V",
-        minimum=0.001,
-        maximum=0.5,
-        origin=assumed("V of algorithms 1 and 2 is not given"),
-    )
-    points: int = parameter(
-        100,
-        "points of each segment of the path, N",
-        minimum=1,
-        maximum=10000,
-        origin=assumed("N of algorithms 1 and 2 is not given; steps of 1 to 3 mm"),
-    )
-    settle: Second = parameter(
-        5.0,
-        "time before the path, for getting to its start and calming down",
-        minimum=0.0,
-        maximum=600.0,
+    speed: float = expose(Planner, "planner.V", minimum=0.001, maximum=0.5)
+    points: int = expose(Planner, "planner.N")
+    settle: float = expose(
+        Planner,
+        "planner.settle",
+        start=5.0,
         origin=assumed(
             "half a turn of a joint at 0.8 rad/s, and a second; algorithms 1 and 2 begin with Move(q_k, dq_0)"
         ),
     )
-    elbow: Elbow = parameter(
-        Elbow.UP,
-        "which way it points; down, it is below the ground on the paper's paths",
-        origin=read_off("fig. 1(a) shows the elbow above the line from shoulder to tip"),
-    )
-    x_0: Vector3[Metre] = parameter(
-        np.array([0.30, 0.0, 0.05]),
-        "start of a custom path in W, z at least 0",
-        minimum=-1.0,
-        maximum=1.0,
-        origin=assumed("start of a path of one's own; the paper's curve starts there"),
-    )
-    x_g: Vector3[Metre] = parameter(
-        np.array([0.40, 0.0, 0.15]),
-        "end of a custom path in W, z at least 0",
+    elbow: Elbow = expose(Planner, "planner.elbow", "kinematics.elbow")
+    x_0: Floats = expose(Planner, "planner.x_0", minimum=-1.0, maximum=1.0)
+    x_g: Floats = expose(
+        Planner,
+        "planner.x_g",
+        start=np.array([0.40, 0.0, 0.15]),
         minimum=-1.0,
         maximum=1.0,
         origin=assumed("end of a path of one's own; middle of the paper's curve"),
@@ -341,36 +302,12 @@ class HybridParameters(Parameters):
         maximum=1.0,
         origin=assumed("about the mean error of the arm with rigid links, which the hybrid is to beat (sec. V-C)"),
     )
-    learned: Learned = parameter(
-        Learned.CUBIC,
-        "what corrects: polynomials, a small network, the paper's, which needs a model, or a beam",
-        origin=assumed("sec. IV-B has networks; polynomials of third degree learn the same from fewer points"),
-    )
-    model: str = parameter(
-        "",
-        "file of a trained model; empty: the one that ships",
-        origin=assumed("the trained model that ships; the paper's is not public"),
-    )
-    friction_compensation: bool = parameter(
-        False,
-        "whether the direction of motion separates the gears' friction from the load",
-        origin=stated("sec. VI names time series of data as future work"),
-    )
-    closed_loop: bool = parameter(
-        False,
-        "whether the controller also gets the tip's position from the tracker",
-        origin=stated("sec. VI names closed-loop control as future work; the paper's is open loop"),
-    )
-    imu: Imu = parameter(
-        Imu.NONE,
-        "IMUs at the links' ends: none, to monitor what was learned, or feedback by them, too",
-        origin=stated("sec. VI names IMUs as future work; the paper's arm has none"),
-    )
-    vibration_damping: bool = parameter(
-        False,
-        "whether joints are turned against swings that changes of speed excite",
-        origin=stated("sec. VI names models of the dynamics as future work"),
-    )
+    learned: Learned = expose(Kinematics, "kinematics.learned")
+    model: str = expose(Kinematics, "kinematics.model")
+    friction_compensation: bool = expose(Kinematics, "kinematics.friction_compensation")
+    closed_loop: bool = expose(Kinematics, "kinematics.closed_loop")
+    imu: Imu = expose(Kinematics, "kinematics.imu")
+    vibration_damping: bool = expose(Kinematics, "kinematics.vibration_damping")
 
     @property
     def is_monitored(self) -> bool:

@@ -47,11 +47,6 @@ ELECTRONICS: dict[str, Any] = {
 """What the arm's parameters are set to for what the published robot's electronics resolve."""
 
 
-def _given(name: str, text: str) -> dict[str, Any]:
-    """Return a parameter's setting, or none for an empty text."""
-    return {name: text} if text else {}
-
-
 class PathExperiment(Experiment[PathEvaluator]):
     """The tip is to follow a path; joint angles, pressures and currents are measured, the tip is not."""
 
@@ -99,35 +94,24 @@ class PathExperiment(Experiment[PathEvaluator]):
         planner = s.add(
             "planner",
             fmu("planner"),
-            path=p.path.name,
-            x_0=p.x_0,
-            x_g=p.x_g,
-            N=p.points,
-            V=p.speed,
-            settle=p.settle,
-            elbow=p.elbow.name,
             pressure=p.pressures,
-            **_given("pressure_steps", p.pressure_steps),
-            **_given("waypoints", str(Path(p.waypoints).absolute()) if p.waypoints else ""),
+            waypoints=str(Path(p.waypoints).absolute()) if p.waypoints else "",
         )
         kinematics = s.add(
             "kinematics",
             fmu("kinematics"),
             method="HYBRID" if self.hybrid else "MODEL_BASED",
-            elbow=p.elbow.name,
             **self.kinematics(p),
         )
         link_2, link_3 = p.links.kinds
         arm = s.add(
             "arm",
             fmu("arm"),
-            motion=p.motion.name,
             link_2=link_2.name,
             link_3=link_3.name,
             load=p.load,
             q_0=p.q_0,
             seed=arm_seed,
-            **_given("load_steps", p.load_steps),
             **(ELECTRONICS if p.resolution is Resolution.ELECTRONICS else {}),
             **arm_of(p).settings,
         )
@@ -215,16 +199,8 @@ class VslHybrid(PathExperiment):
     hybrid: ClassVar[bool] = True
 
     def kinematics(self, parameters: HybridParameters) -> dict[str, Any]:
-        """Return what corrects; the trained model's file is absolute, since a unit may run in another folder."""
-        p = parameters
-        return {
-            "learned": p.learned.name,
-            "model": str(Path(p.model).absolute()) if p.model else "",
-            "friction_compensation": p.friction_compensation,
-            "closed_loop": p.closed_loop,
-            "imu": p.imu.name,
-            "vibration_damping": p.vibration_damping,
-        }
+        """Return the trained model's file, which is absolute, since a unit may run in another folder."""
+        return {"model": str(Path(parameters.model).absolute()) if parameters.model else ""}
 
     def build(self, parameters: Any, seed: int, fmu: FmuOf) -> System:
         """Wire as the other experiment does, and tracker or IMUs to the kinematics if these look at them."""

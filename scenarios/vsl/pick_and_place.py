@@ -71,10 +71,6 @@ class VslPickAndPlace(Experiment[PickAndPlaceEvaluator]):
                 "phase": "says what is touched and when",
                 "done": "by it the run ends",
             },
-            optional=dict.fromkeys(
-                ("p_WP", "p_WQ", "hover", "press", "V", "V_contact", "p_contact", "p_carry", "settle", "wait"),
-                "the scenario's parameter",
-            ),
             remarks=PLACES["planner"].remarks,
         ),
         "kinematics": Place(
@@ -85,13 +81,13 @@ class VslPickAndPlace(Experiment[PickAndPlaceEvaluator]):
         ),
         "arm": Place(
             required={**PLACES["arm"].required, "f_G": "by it touches are judged", "load": "what the gripper holds"},
-            optional={n: PLACES["arm"].optional[n] for n in ("p_cmd", "motion", "q_0", "seed")}
-            | {"face": "where the object's top is", "substep": "as contacts need"},
+            optional={n: PLACES["arm"].optional[n] for n in ("p_cmd", "q_0", "seed")}
+            | {"motion": "it swings", "face": "where the object's top is", "substep": "as contacts need"},
             remarks=PLACES["arm"].remarks,
         ),
         "gripper": Place(
             required={"p_WG": "in W", "vacuum": "", "load": "", "held": "", "p_WO": "in W; by it the run is judged"},
-            optional=dict.fromkeys(("mass", "p_WO_0", "landing"), "the scenario's parameter"),
+            optional={"landing": "the height of the scenario's parameter place"},
             remarks=PLACES["arm"].remarks,
         ),
     }
@@ -107,20 +103,7 @@ class VslPickAndPlace(Experiment[PickAndPlaceEvaluator]):
             raise InvalidParameter(faults)
         q_0 = _q_above(p.pick, p.hover)
         s = System()
-        planner = s.add(
-            "planner",
-            fmu("planner"),
-            p_WP=p.pick,
-            p_WQ=p.place,
-            hover=p.hover,
-            press=p.press,
-            V=p.speed,
-            V_contact=p.contact_speed,
-            p_contact=p.contact_pressure,
-            p_carry=p.carry_pressure,
-            settle=p.settle,
-            wait=p.wait,
-        )
+        planner = s.add("planner", fmu("planner"))
         kinematics = s.add("kinematics", fmu("kinematics"))
         arm = s.add(
             "arm",
@@ -131,7 +114,7 @@ class VslPickAndPlace(Experiment[PickAndPlaceEvaluator]):
             substep=_SUBSTEP,
             seed=int(np.random.SeedSequence(seed).generate_state(1)[0] >> 1),
         )
-        gripper = s.add("gripper", fmu("gripper"), mass=p.mass, p_WO_0=p.pick, landing=p.place[2])
+        gripper = s.add("gripper", fmu("gripper"), landing=p.place[2])
         for name in ("q_ref", "qd_ref"):
             s.connect(getattr(planner.y, name), getattr(kinematics.u, name))
         for name in ("q_cmd", "qd_cmd"):

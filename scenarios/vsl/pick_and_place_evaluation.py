@@ -7,13 +7,15 @@ import numpy as np
 
 from handover.controllers.vsl.hybrid_kinematics import Method
 from handover.controllers.vsl.pick_and_place import PHASES, TaskPhase
+from handover.controllers.vsl.pick_and_place import Params as Task
 from handover.cosim.blocks.origins import assumed
-from handover.cosim.blocks.ports import Floats, Vector3, parameter
-from handover.cosim.blocks.units import Kilogram, Metre, MetrePerSecond, Pascal, Second
+from handover.cosim.blocks.ports import Floats, parameter
+from handover.cosim.blocks.units import Metre
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PlacedUnit
-from handover.plants.vsl.parameters import MAX_PRESSURE
+from handover.plants.vsl.vacuum_gripper import Params as Gripper
 from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
+from handover.scenarios.experiment.exposed import expose
 from handover.scenarios.vsl.arms import unlike_lengths
 from handover.scenarios.vsl.evaluation import EXTRAPOLATION_TO_REPORT
 from handover.scenarios.vsl.training_data import beyond_loads, is_heavy
@@ -35,81 +37,17 @@ _HANGING = (TaskPhase.LIFT, *_ON_THE_WAY)
 class PickAndPlaceParameters:
     """One object that is picked up and put down."""
 
-    mass: Kilogram = parameter(
-        0.05, "mass of the object", minimum=0.0, maximum=0.3, origin=assumed("within the loads of sec. V-C, 0 to 100 g")
-    )
-    pick: Vector3[Metre] = parameter(
-        np.array([0.30, 0.0, 0.06]),
-        "top of the object at the start in W",
-        minimum=-1.0,
-        maximum=1.0,
-        origin=assumed(
-            "where the curve of sec. V-A begins, on an object of some centimetres; no such experiment is published"
-        ),
-    )
-    place: Vector3[Metre] = parameter(
-        np.array([0.36, 0.0, 0.06]),
-        "where it is to be put down, in W; as high as pick",
-        minimum=-1.0,
-        maximum=1.0,
-        origin=assumed("farther out, where the arm sags more"),
-    )
-    contact_pressure: Pascal = parameter(
-        5e4,
-        "pressure in both links near contacts: 5e4 Pa is 0.5 bar",
-        minimum=0.0,
-        maximum=MAX_PRESSURE,
-        origin=assumed("0.5 bar, the softest of sec. V-C"),
-    )
-    carry_pressure: Pascal = parameter(
-        2e5,
-        "pressure in both links while the arm lifts and carries",
-        minimum=0.0,
-        maximum=MAX_PRESSURE,
-        origin=assumed("2 bar, the stiffest of sec. V-C"),
-    )
-    contact_speed: MetrePerSecond = parameter(
-        0.03,
-        "speed at which the tip comes down",
-        minimum=0.005,
-        maximum=0.3,
-        origin=assumed("slow; speeds are not given"),
-    )
-    speed: MetrePerSecond = parameter(
-        0.1,
-        "speed at which it lifts and carries",
-        minimum=0.005,
-        maximum=0.3,
-        origin=assumed("twice that of the paths"),
-    )
-    hover: Metre = parameter(
-        0.08,
-        "how far above the object it travels",
-        minimum=0.02,
-        maximum=0.3,
-        origin=assumed("clear of the object by more than what the arm sags, and swings, as it turns soft"),
-    )
-    press: Metre = parameter(
-        0.008,
-        "how far below the top it is commanded",
-        minimum=0.0,
-        maximum=0.05,
-        origin=assumed("more than the error of the corrected tip, so that it touches for certain"),
-    )
-    settle: Second = parameter(
-        4.0,
-        "time above the object before it comes down",
-        minimum=0.0,
-        maximum=600.0,
-        origin=assumed("as for the paths, a second less: the arm starts nearby"),
-    )
-    wait: Second = parameter(
-        1.5,
-        "time for pressures and the cup to follow",
-        minimum=0.0,
-        maximum=60.0,
-        origin=assumed("six times the regulator's time constant"),
-    )
+    mass: float = expose(Gripper, "gripper.mass", maximum=0.3)
+    pick: Floats = expose(Task, "planner.p_WP", "gripper.p_WO_0", minimum=-1.0, maximum=1.0)
+    place: Floats = expose(Task, "planner.p_WQ", minimum=-1.0, maximum=1.0)
+    contact_pressure: float = expose(Task, "planner.p_contact")
+    carry_pressure: float = expose(Task, "planner.p_carry")
+    contact_speed: float = expose(Task, "planner.V_contact", minimum=0.005, maximum=0.3)
+    speed: float = expose(Task, "planner.V", minimum=0.005, maximum=0.3)
+    hover: float = expose(Task, "planner.hover", minimum=0.02, maximum=0.3)
+    press: float = expose(Task, "planner.press", maximum=0.05)
+    settle: float = expose(Task, "planner.settle")
+    wait: float = expose(Task, "planner.wait", maximum=60.0)
     tolerance: Metre = parameter(
         0.01,
         "how far from its place the object may be, and be dragged over the table, for the run to count as a success",

@@ -20,10 +20,7 @@ PLACES = {
             "moving": "a point of the path counts as it is left while this is true",
             "done": "by it the run ends",
         },
-        optional=dict.fromkeys(
-            ("path", "x_0", "x_g", "N", "V", "settle", "elbow", "pressure", "pressure_steps", "waypoints"),
-            "the scenario's parameter",
-        ),
+        optional={"pressure": "the scenario's parameter"},
         remarks=(_WORLD,),
     ),
     "kinematics": Place(
@@ -39,11 +36,6 @@ PLACES = {
             "model_mismatch": "its share is a metric where tracker or IMUs are wired",
             "innovation": "in W",
             "method": "the scenario's",
-            "elbow": "the scenario's parameter",
-            **dict.fromkeys(
-                ("learned", "model", "friction_compensation", "closed_loop", "imu", "vibration_damping"),
-                "the scenario's parameter",
-            ),
             "p_WG_meas": "in W; wired where the loop is closed",
             "tilt_meas": "of links 2 and 3; wired where there are IMUs",
         },
@@ -62,7 +54,7 @@ PLACES = {
         optional={
             "p_cmd": "",
             "tilt_meas": "of links 2 and 3; wired where there are IMUs",
-            **dict.fromkeys(("motion", "link_2", "link_3", "load", "load_steps", "q_0"), "the scenario's parameter"),
+            **dict.fromkeys(("link_2", "link_3", "load", "q_0"), "the scenario's parameter"),
             **dict.fromkeys(
                 ("base_step", "encoder_step", "transducer_step", "regulator_step"), "set for resolution=electronics"
             ),
