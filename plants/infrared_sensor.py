@@ -2,9 +2,18 @@
 
 import math
 from bisect import bisect_left
+from dataclasses import dataclass
 from functools import lru_cache
 
 from handover.cosim.blocks.block import InvalidParameters
+from handover.cosim.blocks.origins import NOT_GIVEN, assumed, stated
+from handover.cosim.blocks.ports import parameter
+from handover.cosim.blocks.units import Metre, Number, PerTick
+
+_CURVE = assumed(
+    "eq. (11) of [Luberto] states the form; coefficients such that 12 bits cover 4 to 65 mm (84 mm at 0 ticks, 3.8 mm "
+    "at 4095)"
+)
 
 _TOP = 4095  # of a 12-bit converter
 
@@ -141,3 +150,50 @@ class ToleratedSensor(InfraredSensor):
 
     def _range_faults(self) -> list[str]:
         return []
+
+
+@dataclass(frozen=True, kw_only=True)
+class SensorParameters:
+    """What a unit with such sensors declares of them. The characteristic's coefficients are assumed."""
+
+    a: Metre = parameter(
+        0.062, "a of the characteristic y = a exp(b x) + c exp(d x)", minimum=-1.0, maximum=1.0, origin=_CURVE
+    )
+    b: PerTick = parameter(-0.0030, "b of the characteristic", minimum=-0.1, maximum=0.1, origin=_CURVE)
+    c: Metre = parameter(0.022, "c of the characteristic", minimum=-1.0, maximum=1.0, origin=_CURVE)
+    d: PerTick = parameter(-0.00043, "d of the characteristic", minimum=-0.1, maximum=0.1, origin=_CURVE)
+    nearest: Metre = parameter(
+        0.004,
+        "distance of the largest reading; nearer, readings fall again",
+        minimum=1e-4,
+        origin=stated("[Luberto] sec. V-B: operative range 4 to 65 mm"),
+    )
+    farthest: Metre = parameter(
+        0.065,
+        "distance beyond which nothing is seen",
+        maximum=0.15,
+        origin=stated("[Luberto] sec. V-B: operative range 4 to 65 mm"),
+    )
+    contact_share: Number = parameter(
+        0.4, "share of the largest reading that is left at contact", minimum=0.0, maximum=1.0, origin=NOT_GIVEN
+    )
+    incidence_exponent: Number = parameter(
+        1.0,
+        "exponent n of the reading's fall with cos(theta)^n, theta from the normal",
+        minimum=0.0,
+        maximum=10.0,
+        origin=NOT_GIVEN,
+    )
+
+    @property
+    def optics(self) -> tuple[float, float, float, float]:
+        """All but the coefficients."""
+        return self.nearest, self.farthest, self.contact_share, self.incidence_exponent
+
+    def sensor(self) -> InfraredSensor:
+        """Return one of the sensors, with the characteristic's own gain.
+
+        Raises:
+            InvalidSensorParameters: its characteristic cannot be inverted.
+        """
+        return InfraredSensor(self.a, self.b, self.c, self.d, *self.optics)

@@ -12,16 +12,14 @@ import numpy as np
 
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.geometry import rotation_of
-from handover.cosim.blocks.origins import assumed, stated
+from handover.cosim.blocks.origins import assumed
 from handover.cosim.blocks.ports import Floats, Vector3, Vector4, Vector6, output, parameter, port
 from handover.cosim.blocks.start_values import parameter_faults
 from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.terminals import Terminal, TerminalKind, terminal
-from handover.cosim.blocks.units import Metre, Number, PerTick, Radian, Tick
+from handover.cosim.blocks.units import Metre, Number, Radian, Tick
 from handover.plants.helix.gripper_fingers import FINGERS, finger_joints
-from handover.plants.infrared_sensor import InfraredSensor, InvalidSensorParameters
-
-_CURVE = assumed("eq. (11) of [Luberto]; coefficients are not given: as the infrared grasp's")
+from handover.plants.infrared_sensor import InvalidSensorParameters, SensorParameters
 
 _RINGS = ((0.0, 1), (0.5, 6), (0.9, 12))
 """Rays of a beam: part of its half angle, and how many rays lie there around its axis."""
@@ -36,42 +34,13 @@ class InvalidInfraredParameters(InvalidParameters):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Params:
+class Params(SensorParameters):
     """Sensors, ball and palm.
 
     [Luberto] states the operating range of the sensors, their converter (sec. V-B) and the form of their
     characteristic, eq. (11). All else is assumed, the characteristic's coefficients too.
     """
 
-    a: Metre = parameter(
-        0.062, "a of the characteristic y = a exp(b x) + c exp(d x)", minimum=-1.0, maximum=1.0, origin=_CURVE
-    )
-    b: PerTick = parameter(-0.0030, "b of the characteristic", minimum=-0.1, maximum=0.1, origin=_CURVE)
-    c: Metre = parameter(0.022, "c of the characteristic", minimum=-1.0, maximum=1.0, origin=_CURVE)
-    d: PerTick = parameter(-0.00043, "d of the characteristic", minimum=-0.1, maximum=0.1, origin=_CURVE)
-    nearest: Metre = parameter(
-        0.004,
-        "distance of the largest reading; nearer, readings fall again",
-        minimum=1e-4,
-        origin=stated("[Luberto] sec. V-B: 4 to 65 mm"),
-    )
-    farthest: Metre = parameter(
-        0.065, "distance beyond which nothing is seen", maximum=0.15, origin=stated("[Luberto] sec. V-B: 4 to 65 mm")
-    )
-    contact_share: Number = parameter(
-        0.4,
-        "share of the largest reading that is left at contact",
-        minimum=0.0,
-        maximum=1.0,
-        origin=assumed("as the infrared grasp's"),
-    )
-    incidence_exponent: Number = parameter(
-        1.0,
-        "exponent n of the reading's fall with cos(theta)^n, theta from the normal",
-        minimum=0.0,
-        maximum=10.0,
-        origin=assumed("as the infrared grasp's: Lambert's law"),
-    )
     beam: Radian = parameter(
         0.35,
         "half the opening angle of a sensor's beam",
@@ -104,7 +73,7 @@ class Params:
     )
     ball_reflectivity: Number = parameter(
         1.0,
-        "reflectivity of the ball over the reference's",
+        "reflectivity of the ball over that of the surface the sensors were characterised with",
         minimum=0.0,
         maximum=2.0,
         origin=assumed("that of the surface the sensors were characterised with"),
@@ -159,15 +128,6 @@ class Params:
         origin=assumed("as the infrared grasp's"),
     )
     seed: int = parameter(0, "seed of gains, ranges, mounting and noise", minimum=0)
-
-    def sensor(self) -> InfraredSensor:
-        """Return one of the sensors, with the characteristic's own gain.
-
-        Raises:
-            InvalidSensorParameters: its characteristic cannot be inverted.
-        """
-        coefficients = (self.a, self.b, self.c, self.d)
-        return InfraredSensor(*coefficients, self.nearest, self.farthest, self.contact_share, self.incidence_exponent)
 
     def check(self) -> None:
         """Raise InvalidInfraredParameters, with all faults."""

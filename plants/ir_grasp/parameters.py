@@ -20,14 +20,13 @@ from handover.cosim.blocks.units import (
     NewtonPerMetre,
     Number,
     PerSecond,
-    PerTick,
     Radian,
     RadianPerSecond,
     RadianPerSecond2,
     Second,
     Tick,
 )
-from handover.plants.infrared_sensor import InfraredSensor, InvalidSensorParameters, ToleratedSensor
+from handover.plants.infrared_sensor import InfraredSensor, InvalidSensorParameters, SensorParameters, ToleratedSensor
 from handover.plants.ir_grasp.actuation import STIFFNESS
 from handover.plants.ir_grasp.ground import Span, bump
 from handover.plants.ir_grasp.objects import Solid, Thing, placed, polygon_corners, solid_of, with_own
@@ -35,9 +34,6 @@ from handover.plants.ir_grasp.shapes import Disc, polygon_faults
 
 _OWN_TEST = assumed("a test of our own; not in the paper")
 _DRAWN = assumed("not given; the scenario draws it")
-_CURVE = assumed(
-    "eq. (11) states the form; coefficients such that 12 bits cover 4 to 65 mm (84 mm at 0 ticks, 3.8 mm at 4095)"
-)
 _ALIKE = assumed("not given; sensors that are alike")
 
 OUT_OF_RANGE = 0.2
@@ -68,7 +64,7 @@ class InvalidSceneParameters(InvalidParameters):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Params:
+class Params(SensorParameters):
     """Table, object, hand and sensors.
 
     [Luberto] states the operating range of the sensors, their converter (sec. V-B) and the form of their
@@ -225,34 +221,6 @@ class Params:
         maximum=0.9,
         origin=_OWN_TEST,
     )
-    a: Metre = parameter(
-        0.062, "a of the characteristic y = a exp(b x) + c exp(d x)", minimum=-1.0, maximum=1.0, origin=_CURVE
-    )
-    b: PerTick = parameter(-0.0030, "b of the characteristic", minimum=-0.1, maximum=0.1, origin=_CURVE)
-    c: Metre = parameter(0.022, "c of the characteristic", minimum=-1.0, maximum=1.0, origin=_CURVE)
-    d: PerTick = parameter(-0.00043, "d of the characteristic", minimum=-0.1, maximum=0.1, origin=_CURVE)
-    nearest: Metre = parameter(
-        0.004,
-        "distance of the largest reading; nearer, readings fall again",
-        minimum=1e-4,
-        origin=stated("sec. V-B: operative range 4 to 65 mm"),
-    )
-    farthest: Metre = parameter(
-        0.065,
-        "distance beyond which nothing is seen",
-        maximum=0.15,
-        origin=stated("sec. V-B: operative range 4 to 65 mm"),
-    )
-    contact_share: Number = parameter(
-        0.4, "share of the largest reading that is left at contact", minimum=0.0, maximum=1.0, origin=NOT_GIVEN
-    )
-    incidence_exponent: Number = parameter(
-        1.0,
-        "exponent n of the reading's fall with cos(theta)^n, theta from the normal",
-        minimum=0.0,
-        maximum=10.0,
-        origin=NOT_GIVEN,
-    )
     beam: Radian = parameter(
         0.15, "half the opening angle of a sensor's beam", minimum=0.0, maximum=0.7, origin=NOT_GIVEN
     )
@@ -387,18 +355,6 @@ class Params:
         rng = np.random.default_rng([self.seed, 0x571FF])
         return STIFFNESS * (1.0 + self.stiffness_tolerance * rng.uniform(-1.0, 1.0, STIFFNESS.shape))
 
-    def sensor(self) -> InfraredSensor:
-        """Return one of the sensors.
-
-        Raises:
-            InvalidSensorParameters: its characteristic cannot be inverted.
-        """
-        return InfraredSensor(self.a, self.b, self.c, self.d, *self._optics)
-
-    @property
-    def _optics(self) -> tuple[float, float, float, float]:
-        return self.nearest, self.farthest, self.contact_share, self.incidence_exponent
-
     def finger_sensors(self) -> list[InfraredSensor]:
         """Return the sensors of thumb, index and ring, each with its constants off by its scales and the tolerance.
 
@@ -413,7 +369,7 @@ class Params:
         faults, sensors = list[str](), list[InfraredSensor]()
         for finger, (a, b, c, d) in zip(("thumb", "index", "ring"), constants.tolist(), strict=True):
             try:
-                sensors.append(ToleratedSensor(a, b, c, d, *self._optics))
+                sensors.append(ToleratedSensor(a, b, c, d, *self.optics))
             except InvalidSensorParameters as error:
                 faults.extend(f"{finger}, with its scales and tolerance: {fault}" for fault in error.faults)
         if faults:

@@ -32,9 +32,9 @@ def expose(
     """Declare a scenario's parameter, as the default of a dataclass field, by that of a unit.
 
     Args:
-        params: where the unit declares it.
+        params: where the unit declares it, or another scenario of the same units.
         paths: `UNIT.NAME` of each parameter that gets the value, UNIT being the unit's name in the system; the first
-            one's NAME is that in `params`.
+            one's NAME is that in `params`. Of another scenario's parameter `NAME` alone, to which its own paths belong.
         start: the scenario's own default.
         origin: of that.
         minimum: the scenario's own lower bound.
@@ -44,14 +44,15 @@ def expose(
     Raises:
         DeclarationError: `params` does not declare it.
     """
-    name = paths[0].partition(".")[2]
+    name = paths[0].rpartition(".")[2]
     metadata = next((f.metadata for f in fields(params) if f.name == name), {})
     if "declaration" not in metadata:
         raise DeclarationError(params.__name__, name, "it cannot be exposed, as it is not declared")
     own = {"origin": origin, "minimum": minimum, "maximum": maximum, "description": description or None, "start": start}
     declaration = replace(metadata["declaration"], **{k: v for k, v in own.items() if v is not None})
     hint = metadata.get("type", _hints(params)[name])
-    return declared_field(declaration, type=hint, exposes=paths)
+    exposes = tuple(path for path in paths if "." in path) or metadata.get("exposes", ())
+    return declared_field(declaration, type=hint, exposes=exposes)
 
 
 @functools.cache

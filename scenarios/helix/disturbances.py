@@ -10,21 +10,14 @@ from typing import Any
 
 import numpy as np
 
+from handover.controllers.helix.servo.servo_parameters import Params as ServoParams
 from handover.cosim.blocks.origins import assumed, derived
 from handover.cosim.blocks.ports import Floats, parameter
-from handover.cosim.blocks.units import (
-    Kilogram,
-    Levels,
-    Metre,
-    MetrePerSecond,
-    Newton,
-    NewtonPerMetre,
-    Number,
-    Pixel,
-    Radian,
-    Second,
-)
+from handover.cosim.blocks.units import Metre, Number, Pixel, Radian, Second
 from handover.plants.helix.arm.tendon_parameters import Params as ArmParams
+from handover.plants.helix.cameras.camera_parameters import Params as CameraParams
+from handover.plants.helix.hand.partner_parameters import Params as HandParams
+from handover.scenarios.experiment.exposed import expose
 
 
 class Cover(enum.IntEnum):
@@ -53,51 +46,13 @@ class Disturbances:
         maximum=4.0,
         origin=derived("undisturbed: the arm as it is"),
     )
-    tremor: Metre = parameter(
-        0.001,
-        "root mean square of the hand's tremor",
-        minimum=0.0,
-        maximum=0.05,
-        origin=assumed("physiological tremor of an outstretched hand"),
-    )
-    drift: Metre = parameter(
-        0.003,
-        "root mean square of the hand's drift",
-        minimum=0.0,
-        maximum=0.1,
-        origin=assumed("how still a hand is held"),
-    )
-    ball_mass: Kilogram = parameter(
-        0.02, "mass of the ball", minimum=0.001, maximum=1.0, origin=assumed("a light ball of 25 mm radius")
-    )
-    finger_friction: Number = parameter(
-        0.8,
-        "friction between the gripper's fingers and the ball",
-        minimum=0.0,
-        maximum=3.0,
-        origin=assumed("rubber on a smooth ball"),
-    )
-    hand_force_max: Newton = parameter(
-        5.0,
-        "force on the hand that the person tolerates",
-        minimum=0.1,
-        maximum=1000.0,
-        origin=assumed("what a person who holds a hand out lets an arm press"),
-    )
-    help_speed: MetrePerSecond = parameter(
-        0.0,
-        "how fast the person brings the ball between the fingers of a gripper that closes; 0: holds it still",
-        minimum=0.0,
-        maximum=1.0,
-        origin=derived("secs. 3.5 and 3.5.1 say only that the hand holds the ball; see experiment.help_speed"),
-    )
-    guidance: NewtonPerMetre = parameter(
-        0.0,
-        "stiffness with which the person draws the gripper to the ball",
-        minimum=0.0,
-        maximum=1000.0,
-        origin=derived("secs. 3.5.1 and 3.5.2: only in the second experiment a person leads the arm"),
-    )
+    tremor: float = expose(HandParams, "hand.tremor_rms")
+    drift: float = expose(HandParams, "hand.drift_rms")
+    ball_mass: float = expose(HandParams, "hand.ball_mass")
+    finger_friction: float = expose(HandParams, "hand.finger_friction")
+    hand_force_max: float = expose(HandParams, "hand.force_max")
+    help_speed: float = expose(HandParams, "hand.help_speed")
+    guidance: float = expose(HandParams, "hand.guide_stiffness")
     move_azimuth: Radian = parameter(
         0.0,
         "turn about the arm's axis by which the hand moves on",
@@ -112,11 +67,12 @@ class Disturbances:
         maximum=0.5,
         origin=derived("sec. 3.5.1: the hand holds the ball at one place"),
     )
-    move_from: Second = parameter(
-        4.0,
-        "time at which the hand moves on, if it does",
-        minimum=0.0,
+    move_from: float = expose(
+        HandParams,
+        "hand.move_from",
+        start=4.0,
         maximum=600.0,
+        description="time at which the hand moves on, if it does",
         origin=assumed("own choice: while the arm approaches"),
     )
     move_for: Second = parameter(
@@ -147,34 +103,10 @@ class Disturbances:
         maximum=0.2,
         origin=derived("undisturbed: as calibrated"),
     )
-    light: Number = parameter(
-        1.0,
-        "brightness over the usual one",
-        minimum=0.0,
-        maximum=5.0,
-        origin=derived("the usual brightness, by definition"),
-    )
-    sensor_noise: Levels = parameter(
-        2.2,
-        "standard deviation of the pictures' noise",
-        minimum=0.0,
-        maximum=60.0,
-        origin=assumed("own choice: a webcam's size of noise, of 255 levels"),
-    )
-    lost_pictures: Number = parameter(
-        0.0,
-        "part of the pictures that arrive black",
-        minimum=0.0,
-        maximum=1.0,
-        origin=derived("undisturbed: every picture arrives"),
-    )
-    covered_markers: int = parameter(
-        0,
-        "markers with tape over them, those that face the cameras first",
-        minimum=0,
-        maximum=8,
-        origin=derived("undisturbed: no tape"),
-    )
+    light: float = expose(CameraParams, "camera.light")
+    sensor_noise: float = expose(CameraParams, "camera.noise")
+    lost_pictures: float = expose(CameraParams, "camera.lost_pictures")
+    covered_markers: int = expose(CameraParams, "camera.covered_markers")
     hide_from: Second = parameter(
         4.0,
         "time at which a card hides the ball, if it does",
@@ -202,13 +134,7 @@ class Disturbances:
     cover_for: Second = parameter(
         2.0, "how long the lens is covered", minimum=0.0, maximum=600.0, origin=assumed("own choice")
     )
-    jitter: Number = parameter(
-        0.0,
-        "largest deviation of a control period, drawn evenly, as a part of it",
-        minimum=0.0,
-        maximum=0.9,
-        origin=assumed("a period that is kept; the thesis's deviates by 0.02 to 0.18 s (table 1)"),
-    )
+    jitter: float = expose(ServoParams, "servo.jitter")
 
     def covered(self, side: Cover) -> tuple[float, float]:
         """Return from when until when a lens is covered, in seconds; (0, 0) where it is not."""
@@ -220,23 +146,16 @@ class Disturbances:
         return self.move_azimuth != 0.0 or self.move_height != 0.0
 
     def camera_values(self) -> dict[str, Any]:
-        """Return what they set on the camera unit."""
+        """Return what follows from them for the camera unit."""
         hidden = (self.hide_from, self.hide_from + self.hide_for) if self.hide_for > 0.0 else (0.0, 0.0)
-        values: dict[str, Any] = {
-            "light": self.light,
-            "noise": self.sensor_noise,
-            "lost_pictures": self.lost_pictures,
-            "covered_markers": self.covered_markers,
-            "hide_ball_from": hidden[0],
-            "hide_ball_until": hidden[1],
-        }
+        values: dict[str, Any] = {"hide_ball_from": hidden[0], "hide_ball_until": hidden[1]}
         for side in (Cover.LEFT, Cover.RIGHT):
             name = f"cover_{side.name.lower()}"
             values[f"{name}_from"], values[f"{name}_until"] = self.covered(side)
         return values
 
     def arm_values(self) -> dict[str, Any]:
-        """Return what they set on the arm."""
+        """Return what follows from them for the arm."""
         arm = vars(ArmParams())
         return {
             "EA": self.arm_stiffness * arm["EA"],
@@ -245,19 +164,11 @@ class Disturbances:
         }
 
     def hand_values(self, p_WO: Floats) -> dict[str, Any]:
-        """Return what they set on the hand that offers the ball at p_WO, shape (3,), m."""
+        """Return what follows from them for the hand that offers the ball at p_WO, shape (3,), m."""
         a = self.move_azimuth
         turn = np.array([[np.cos(a), -np.sin(a), 0.0], [np.sin(a), np.cos(a), 0.0], [0.0, 0.0, 1.0]])
         return {
             "p_WO_0": p_WO,
             "p_WO_1": turn @ p_WO + np.array([0.0, 0.0, self.move_height]),
-            "move_from": self.move_from,
             "move_for": self.move_for if self.moves else 0.0,
-            "tremor_rms": self.tremor,
-            "drift_rms": self.drift,
-            "guide_stiffness": self.guidance,
-            "help_speed": self.help_speed,
-            "ball_mass": self.ball_mass,
-            "finger_friction": self.finger_friction,
-            "force_max": self.hand_force_max,
         }

@@ -16,6 +16,7 @@ from handover.cosim.record.reader import Record
 from handover.cosim.system.system import System
 from handover.plants.helix.hand.partner_parameters import Params as PartnerParams
 from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf
+from handover.scenarios.experiment.exposed import carry
 from handover.scenarios.experiment.live_inputs import Pushable
 from handover.scenarios.experiment.paper import PublishedValue, paper_values
 from handover.scenarios.experiment.parameters import InvalidParameter
@@ -134,24 +135,12 @@ class HelixHandover(Experiment[HandoverEvaluator]):
             "camera",
             fmu("camera"),
             period=p.picture_period,
-            decimation=p.decimation,
             seed=camera_seed,
-            marker=p.marker,
-            rings=p.rings,
             **camera_parameters(p.camera_turn, p.cameras),
             **p.camera_values(),
             **of_cameras,
         )
-        vision = s.add(
-            "vision",
-            fmu("vision"),
-            period=p.picture_period,
-            decimation=p.decimation,
-            detector=p.detector,
-            marker=p.marker,
-            rings=p.rings,
-            **calibration,
-        )
+        vision = s.add("vision", fmu("vision"), period=p.picture_period, **calibration)
         settings = p.settings
         servo = s.add(
             "servo",
@@ -159,10 +148,7 @@ class HelixHandover(Experiment[HandoverEvaluator]):
             period=p.picture_period if settings["filter_pictures"] or p.jitter > 0.0 else p.period,
             sampled=True,
             control_period=float(p.period),
-            alpha=p.alpha,
-            threshold=p.threshold,
             adaptive_step=p.step_rule is StepRule.BY_ERROR,
-            jitter=p.jitter,
             seed=servo_seed,
             **settings,
         )
@@ -175,7 +161,7 @@ class HelixHandover(Experiment[HandoverEvaluator]):
         s.connect(servo.y, arm.u)
         s.connect(hand.y, arm.u)
         s.connect(arm.y, hand.u)
-        return s
+        return carry(p, s)
 
     def check_unit_values(self, system: System, given: Sequence[str]) -> None:  # noqa: ARG002
         """Reject a ball or a hand that starts in the arm or its gripper.

@@ -11,19 +11,18 @@ from typing import ClassVar
 
 import numpy as np
 
-from handover.cosim.blocks.origins import assumed, derived
-from handover.cosim.blocks.ports import Floats, parameter
-from handover.cosim.blocks.units import Metre, Number, Radian, Second
+from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System
 from handover.scenarios.experiment.experiment import Evaluator, Experiment, FmuOf, Metric, Outcome
+from handover.scenarios.experiment.exposed import expose
 from handover.scenarios.experiment.live_inputs import Pushable
 from handover.scenarios.experiment.places import Place
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import Curve, TimeFigure, TimePlot, phases_of
-from handover.scenarios.helix.parameters import CAMERA_PERIOD, PUSHES
-from handover.scenarios.helix.places import PLACES
+from handover.scenarios.helix.helix_handover import HelixHandover
+from handover.scenarios.helix.parameters import CAMERA_PERIOD, PUSHES, Parameters
 
 _KNOWN = 1e-8
 """Variance of an exact measurement, m2; 0 would be of no measurement."""
@@ -33,46 +32,11 @@ _KNOWN = 1e-8
 class ReachParameters:
     """Where the gripper is to come."""
 
-    azimuth: Radian = parameter(
-        0.0,
-        "direction of the place from the arm's axis",
-        minimum=-np.pi,
-        maximum=np.pi,
-        origin=derived("sec. 3.5.1: at the place itself"),
-    )
-    radius: Metre = parameter(
-        0.16,
-        "distance of the place from the arm's axis",
-        minimum=0.0,
-        maximum=2.0,
-        origin=assumed(
-            "distance of the offered ball from the arm's axis; fig. 9 has the gripper 0.16 m from its start at the end"
-        ),
-    )
-    height: Metre = parameter(
-        -0.6,
-        "height of the place in W",
-        minimum=-1.1,
-        maximum=0.0,
-        origin=assumed(
-            "height of the offered ball in W, 10 cm above the hanging gripper; figs. 4 and 6 show it "
-            "between wrist and gripper"
-        ),
-    )
-    alpha: Number = parameter(
-        0.25,
-        "step size of the Jacobian control, eq. (21)",
-        minimum=0.01,
-        maximum=1.0,
-        origin=assumed("with control_period half of the way in a second: the averaged command trails by half a second"),
-    )
-    patience: Second = parameter(
-        60.0,
-        "time by which the gripper must be there",
-        minimum=1.0,
-        maximum=600.0,
-        origin=assumed("own choice: of the thesis's runs with alpha 0.2 and 0.4 the slowest took 57.6 s (table 1)"),
-    )
+    azimuth: float = expose(Parameters, "azimuth", description="direction of the place from the arm's axis")
+    radius: float = expose(Parameters, "radius", description="distance of the place from the arm's axis")
+    height: float = expose(Parameters, "height", description="height of the place in W")
+    alpha: float = expose(Parameters, "alpha")
+    patience: float = expose(Parameters, "patience", description="time by which the gripper must be there")
 
     @property
     def p_WO(self) -> Floats:
@@ -127,7 +91,7 @@ class HelixReach(Experiment[ReachEvaluator]):
     title: ClassVar[str] = "how far the Helix reaches, with exact measurements instead of cameras"
     parameters_type: ClassVar[type[ReachParameters]] = ReachParameters
     units: ClassVar[Mapping[str, str]] = {"servo": "VisualServo", "arm": "TendonArm", "hand": "HandoverPartner"}
-    places: ClassVar[Mapping[str, Place]] = {name: PLACES[name] for name in units}
+    places: ClassVar[Mapping[str, Place]] = {name: HelixHandover.places[name] for name in units}
     headline: ClassVar[tuple[str, ...]] = ("final_distance", "tilt", "arm_time")
     is_seeded: ClassVar[bool] = False
     parallel_step: ClassVar[Fraction | None] = Fraction(1, 50)
@@ -140,7 +104,6 @@ class HelixReach(Experiment[ReachEvaluator]):
             fmu("servo"),
             period=3 * CAMERA_PERIOD,
             sampled=True,
-            alpha=parameters.alpha,
             seen_O=True,
             seen_R=True,
             cov_O=known,

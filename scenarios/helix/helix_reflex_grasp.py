@@ -14,6 +14,7 @@ import numpy as np
 from handover.cosim.record.reader import Record
 from handover.cosim.system.system import System
 from handover.scenarios.experiment.experiment import Figure, FmuOf
+from handover.scenarios.experiment.exposed import with_exposed
 from handover.scenarios.experiment.paper import PublishedValue
 from handover.scenarios.experiment.pictures import CameraPicture
 from handover.scenarios.experiment.places import Place
@@ -41,7 +42,7 @@ class HelixReflexGrasp(HelixHandover):
         "fingers": "FingerInfrared",
         "reflex": "GraspReflex",
     }
-    places: ClassVar[Mapping[str, Place]] = REFLEX_PLACES
+    places: ClassVar[Mapping[str, Place]] = with_exposed(REFLEX_PLACES, Parameters)
     headline: ClassVar[tuple[str, ...]] = (
         "closing_offset_lateral",
         "closing_offset_axial",
@@ -63,11 +64,6 @@ class HelixReflexGrasp(HelixHandover):
         fingers = s.add(
             "fingers",
             fmu("fingers"),
-            ball_reflectivity=p.reflectivity,
-            palm_reflectivity=p.palm_reflectivity,
-            tolerance=p.sensor_tolerance,
-            range_tolerance=p.range_tolerance,
-            mounting_tolerance=p.mounting_tolerance,
             seed=sensor_seed,
         )
         reflex = s.add(
@@ -75,8 +71,6 @@ class HelixReflexGrasp(HelixHandover):
             fmu("reflex"),
             period=handover.picture_period,
             sampled=True,
-            feels=p.reflex,
-            ball_radius=p.expected_radius,
         )
         vision, servo, arm, hand = (s.units[name] for name in ("vision", "servo", "arm", "hand"))
         s.connect(arm.y, fingers.u)

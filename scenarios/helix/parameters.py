@@ -9,9 +9,13 @@ import numpy as np
 
 from handover.controllers.helix.servo.servo_parameters import Params as ServoParams
 from handover.controllers.helix.vision.vision_parameters import Detector
+from handover.controllers.helix.vision.vision_parameters import Params as VisionParams
+from handover.cosim.blocks.cameras import CamerasAndMarkers
 from handover.cosim.blocks.origins import assumed, derived, stated
 from handover.cosim.blocks.ports import Floats, parameter
-from handover.cosim.blocks.units import Metre, Number, Radian, Second
+from handover.cosim.blocks.units import Metre, Radian, Second
+from handover.plants.helix.cameras.camera_parameters import Params as CameraParams
+from handover.scenarios.experiment.exposed import expose
 from handover.scenarios.experiment.live_inputs import Pushable
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.helix.cameras import CameraPlaces
@@ -86,13 +90,7 @@ def settings_of(tuning: Tuning) -> dict[str, Any]:
 class Task:
     """Where the ball is offered, what the wrist carries, and how detector and controller are set."""
 
-    alpha: Number = parameter(
-        0.25,
-        "step size of the Jacobian control, eq. (21)",
-        minimum=0.01,
-        maximum=1.0,
-        origin=assumed("with control_period half of the way in a second: the averaged command trails by half a second"),
-    )
+    alpha: float = expose(ServoParams, "servo.alpha", minimum=0.01)
     place: HandPlace = parameter(
         HandPlace.FRONT, "where the hand offers the ball", origin=assumed("sec. 3.5.1: the first of its places")
     )
@@ -122,24 +120,8 @@ class Task:
             "between wrist and gripper"
         ),
     )
-    control_period: Second = parameter(
-        0.5,
-        "period of the controller",
-        minimum=0.1,
-        maximum=10.0,
-        origin=assumed(
-            "the thesis's loop took 1.45 s of computing a step (table 1, alpha 0.4); this one needs a hundredth of that"
-        ),
-    )
-    threshold: Metre = parameter(
-        0.05,
-        "error at which the arm descends onto the ball",
-        minimum=0.001,
-        maximum=0.08,
-        origin=stated(
-            "appendix A, epsilon_threshold; the norm, as secs. 3.4 and 3.5 have it (algorithm 3 prints its square)"
-        ),
-    )
+    control_period: float = expose(ServoParams, "servo.control_period", minimum=0.1, maximum=10.0)
+    threshold: float = expose(ServoParams, "servo.threshold", minimum=0.001, maximum=0.08)
     tuning: Tuning = parameter(
         Tuning.OWN,
         "bounds and weights of the controller: ours, or the thesis's",
@@ -170,27 +152,14 @@ class Task:
         "two behind the arm, the right one of them above or at the side instead, or a third one above",
         origin=stated("sec. 3.2.1: beside each other, behind the arm"),
     )
-    detector: Detector = parameter(
-        Detector.JOINT,
-        "how ball and wrist are found: one fit to all that the cameras see, or the thesis's averages",
-        origin=assumed(
-            "one fit to all that both cameras see; the thesis's own (sec. 3.2.3 and 3.2.4) is detector=published"
-        ),
-    )
-    marker: Metre = parameter(
-        0.02, "side of the wrist's markers", minimum=0.005, maximum=0.05, origin=stated("sec. 3.2.4")
-    )
-    rings: int = parameter(
-        1,
-        "rings of markers: a second one sits above the first",
-        minimum=1,
-        maximum=2,
-        origin=stated("sec. 3.2.4: a ring of markers around the wrist"),
-    )
-    decimation: int = parameter(
-        3,
-        "of 30 pictures a second, every so many-th is taken",
-        minimum=1,
+    detector: Detector = expose(VisionParams, "vision.detector")
+    marker: float = expose(CamerasAndMarkers, "camera.marker", "vision.marker")
+    rings: int = expose(CamerasAndMarkers, "camera.rings", "vision.rings")
+    decimation: int = expose(
+        CameraParams,
+        "camera.decimation",
+        "vision.decimation",
+        start=3,
         maximum=30,
         origin=assumed("own choice: ten pictures a second, five in a control period"),
     )

@@ -15,7 +15,6 @@ _CALIBRATION = {
     for what in ("p_WC", "q_WC", "intrinsics", "distortion")
 }  # fmt: skip
 _THIRD = "with cameras=three alone"
-_MARKERS = {"marker": "the scenario's marker", "rings": "the scenario's rings"}
 _SEEN = {
     "p_WO_meas": "in W; while it is not seen, the last one, zeros before any",
     "p_WR_meas": "in W; the wrist carries the marker ring, at the end of the arm's centre line",
@@ -54,11 +53,10 @@ PLACES = {
             **_CALIBRATION,
             "seed": "follows from the run's seed",
             "decimation": "the unit is stepped so often",
-            **_MARKERS,
             **dict.fromkeys(
                 (
-                    *("cover_left_from", "cover_left_until", "cover_right_from", "cover_right_until", "light", "noise"),
-                    *("lost_pictures", "covered_markers", "hide_ball_from", "hide_ball_until"),
+                    *("cover_left_from", "cover_left_until", "cover_right_from", "cover_right_until"),
+                    *("hide_ball_from", "hide_ball_until"),
                 ),
                 "the scenario's disturbances",
             ),
@@ -74,8 +72,6 @@ PLACES = {
             **_COVARIANCES,
             **dict.fromkeys(_CALIBRATION, "as the clicks of the calibration give it"),
             "decimation": "the unit is stepped so often",
-            "detector": "the scenario's detector",
-            **_MARKERS,
         },
         remarks=(_BASE, "Without covariances, those that the controller gets are zeros."),
     ),
@@ -99,15 +95,12 @@ PLACES = {
             "p_WR_est": "in W; shown in pictures",
             "p_WG_est": "in W; shown in plots, pictures and replay",
             "control_period": "the unit is stepped so often; by it, control steps are counted",
-            "alpha": "the scenario's alpha",
-            "threshold": "the scenario's threshold",
             "threshold_grasp": "by the scenario's tuning",
             "epsilon_pose_bound": "by the scenario's tuning",
             "epsilon_control": "by the scenario's tuning",
             "A_pose_upd": "by the scenario's tuning",
             "settle_steps": "by the scenario's tuning",
             "adaptive_step": "the scenario's step_rule",
-            "jitter": "the scenario's jitter",
             "seed": "follows from the run's seed",
             **_TUNED,
         },
@@ -157,20 +150,7 @@ PLACES = {
             "seed": "follows from the run's seed",
             "p_WO_1": "in W; where the hand moves on to",
             "room": "0 in helix_reach, whose hand does not wait",
-            **dict.fromkeys(
-                (
-                    "move_from",
-                    "move_for",
-                    "tremor_rms",
-                    "drift_rms",
-                    "guide_stiffness",
-                    "help_speed",
-                    "ball_mass",
-                    "finger_friction",
-                    "force_max",
-                ),
-                "by the scenario's parameters",
-            ),
+            "move_for": "0 where the hand stays; else the scenario's parameter",
         },
         remarks=(_BASE,),
     ),
@@ -183,11 +163,6 @@ _FINGERS = {
     "grip": "",
     "p_WO": "in W",
     "p_WH": "in W",
-    "ball_reflectivity": "the scenario's reflectivity",
-    "palm_reflectivity": "the scenario's",
-    "tolerance": "the scenario's sensor_tolerance",
-    "range_tolerance": "the scenario's",
-    "mounting_tolerance": "the scenario's",
     "seed": "follows from the run's seed",
 }
 _CORRECTED = {
@@ -230,8 +205,6 @@ REFLEX_PLACES = {
             "deviation": "shown over time",
             "reflectivity": "shown as a signal",
             "sensors": "shown as a signal",
-            "feels": "the scenario's reflex",
-            "ball_radius": "the scenario's expected_radius",
         },
         remarks=(_BASE,),
     ),

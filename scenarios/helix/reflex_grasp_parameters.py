@@ -4,11 +4,12 @@ import enum
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
-from handover.cosim.blocks.origins import assumed, derived
+from handover.controllers.helix.reflex.grasp_reflex import Params as ReflexParams
+from handover.cosim.blocks.origins import assumed
 from handover.cosim.blocks.ports import parameter
-from handover.cosim.blocks.units import Metre, Number, Pixel, Radian, Second
+from handover.cosim.blocks.units import Metre
+from handover.plants.helix.finger_infrared import Params as FingerParams
+from handover.scenarios.experiment.exposed import expose
 from handover.scenarios.helix.parameters import Parameters
 
 
@@ -31,9 +32,7 @@ class LastStretch(enum.IntEnum):
 class ReflexGraspParameters:
     """One handover whose last stretch the fingers' sensors may guide."""
 
-    reflex: bool = parameter(
-        True, "correct the gripper's goal by the fingers' sensors", origin=assumed("what the scenario is for")
-    )
+    reflex: bool = expose(ReflexParams, "reflex.feels")
     cameras: LastStretch = parameter(
         LastStretch.FREE,
         "what the cameras see from the first time on that the gripper is near",
@@ -51,116 +50,21 @@ class ReflexGraspParameters:
         "where the ball is offered: drawn by the seed, or as given",
         origin=assumed("evenly over reach and sight"),
     )
-    azimuth: Radian = parameter(
-        0.0,
-        "of a given place: its direction from the arm's axis",
-        minimum=-np.pi,
-        maximum=np.pi,
-        origin=assumed("of a given place: in front"),
-    )
-    radius: Metre = parameter(
-        0.16,
-        "of a given place: its distance from the arm's axis",
-        minimum=0.0,
-        maximum=2.0,
-        origin=assumed(
-            "distance of the offered ball from the arm's axis; fig. 9 has the gripper 0.16 m from its start at the end"
-        ),
-    )
-    height: Metre = parameter(
-        -0.6,
-        "of a given place: its height in W",
-        minimum=-1.1,
-        maximum=0.0,
-        origin=assumed(
-            "height of the offered ball in W, 10 cm above the hanging gripper; figs. 4 and 6 show it "
-            "between wrist and gripper"
-        ),
-    )
-    alpha: Number = parameter(
-        0.25,
-        "step size of the Jacobian control, eq. (21)",
-        minimum=0.01,
-        maximum=1.0,
-        origin=assumed("with control_period half of the way in a second: the averaged command trails by half a second"),
-    )
-    patience: Second = parameter(
-        60.0,
-        "time by which the gripper must begin to close",
-        minimum=1.0,
-        maximum=600.0,
-        origin=assumed("own choice: of the thesis's runs with alpha 0.2 and 0.4 the slowest took 57.6 s (table 1)"),
-    )
-    tremor: Metre = parameter(
-        0.001,
-        "root mean square of the hand's tremor",
-        minimum=0.0,
-        maximum=0.05,
-        origin=assumed("physiological tremor of an outstretched hand"),
-    )
-    drift: Metre = parameter(
-        0.003,
-        "root mean square of the hand's drift",
-        minimum=0.0,
-        maximum=0.1,
-        origin=assumed("how still a hand is held"),
-    )
-    click_noise: Pixel = parameter(
-        0.5,
-        "standard deviation of the calibration's clicks",
-        minimum=0.0,
-        maximum=50.0,
-        origin=assumed("own choice: a careful click; sec. 3.2.2 says only that corners are selected in the pictures"),
-    )
-    camera_turn: Radian = parameter(
-        0.0,
-        "angle by which the right camera was turned after calibration",
-        minimum=-0.2,
-        maximum=0.2,
-        origin=derived("undisturbed: as calibrated"),
-    )
-    reflectivity: Number = parameter(
-        1.0,
-        "reflectivity of the ball over that of the surface the sensors were characterised with",
-        minimum=0.05,
-        maximum=2.0,
-        origin=assumed("that of the surface the sensors were characterised with"),
-    )
-    sensor_tolerance: Number = parameter(
-        0.05,
-        "standard deviation of a sensor's gain from the characteristic's",
-        minimum=0.0,
-        maximum=0.5,
-        origin=assumed("parts of one make differ by some percent after calibration of one of them"),
-    )
-    range_tolerance: Number = parameter(
-        0.05,
-        "standard deviation of a sensor's range from the characteristic's, as a part of it",
-        minimum=0.0,
-        maximum=0.3,
-        origin=assumed("parts of one make differ by some percent after calibration of one of them"),
-    )
-    mounting_tolerance: Radian = parameter(
-        0.03,
-        "standard deviation of a sensor's direction from the design's, in each of two",
-        minimum=0.0,
-        maximum=0.3,
-        origin=assumed("small parts that are glued into a printed finger are off by a degree or two"),
-    )
-    palm_reflectivity: Number = parameter(
-        0.6,
-        "reflectivity of the palm in infrared; the reflex expects 0.6",
-        minimum=0.0,
-        maximum=2.0,
-        origin=assumed("skin returns some six tenths of what a white card does in the near infrared"),
-    )
-    expected_radius: Metre = parameter(
-        0.025,
-        "radius of the ball that the reflex expects; it has 25 mm",
-        minimum=0.005,
-        maximum=0.1,
-        origin=assumed("as the cameras see it"),
-    )
+    azimuth: float = expose(Parameters, "azimuth", description="of a given place: its direction from the arm's axis")
+    radius: float = expose(Parameters, "radius", description="of a given place: its distance from the arm's axis")
+    height: float = expose(Parameters, "height", description="of a given place: its height in W")
+    alpha: float = expose(Parameters, "alpha")
+    patience: float = expose(Parameters, "patience")
+    tremor: float = expose(Parameters, "tremor")
+    drift: float = expose(Parameters, "drift")
+    click_noise: float = expose(Parameters, "click_noise")
+    camera_turn: float = expose(Parameters, "camera_turn")
+    reflectivity: float = expose(FingerParams, "fingers.ball_reflectivity", minimum=0.05)
+    sensor_tolerance: float = expose(FingerParams, "fingers.tolerance")
+    range_tolerance: float = expose(FingerParams, "fingers.range_tolerance")
+    mounting_tolerance: float = expose(FingerParams, "fingers.mounting_tolerance")
+    palm_reflectivity: float = expose(FingerParams, "fingers.palm_reflectivity")
+    expected_radius: float = expose(ReflexParams, "reflex.ball_radius", minimum=0.005)
 
     @property
     def handover(self) -> Parameters:

@@ -13,6 +13,7 @@ from handover.controllers.helix.reflex.finger_model import FingerModel
 from handover.controllers.helix.reflex.offset_filter import Doubts, OffsetFilter
 from handover.controllers.helix.servo.arm_motion import FirstOrderLag, Response
 from handover.controllers.helix.servo.constant_curvature import W_FROM_B, linearise, orientation, state_of
+from handover.controllers.helix.servo.servo_parameters import Inputs as Measurements
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.origins import assumed, stated
 from handover.cosim.blocks.ports import Floats, Matrix3, Vector3, Vector6, Vector9, output, parameter, port
@@ -62,7 +63,9 @@ class Params:
     """The controller's own model of arm, fingers and sensors, and its doubts; all assumed."""
 
     feels: bool = parameter(
-        True, "take in what the fingers read; false: cameras and motors alone", origin=assumed("the scenario's reflex")
+        True,
+        "correct the goal by what the fingers read; false: cameras and motors alone",
+        origin=assumed("what the scenario is for"),
     )
     a: Metre = parameter(
         0.062, "a of the characteristic y = a exp(b x) + c exp(d x)", minimum=1e-6, maximum=1.0, origin=_CHARACTERISED
@@ -264,17 +267,9 @@ class Params:
 
 
 @dataclass(kw_only=True)
-class Inputs:
+class Inputs(Measurements):
     """What vision, fingers and encoders measure, and what the servo believes of the arm; positions in W."""
 
-    p_WO_meas: Vector3[Metre] = port(np.zeros(3), "measured position of the ball")
-    p_WR_meas: Vector3[Metre] = port(np.zeros(3), "measured position of the wrist")
-    p_WG_meas: Vector3[Metre] = port(np.zeros(3), "measured position of the gripper")
-    cov_O: Matrix3[SquareMetre] = port(np.zeros((3, 3)), "covariance of p_WO_meas")
-    cov_R: Matrix3[SquareMetre] = port(np.zeros((3, 3)), "covariance of p_WR_meas")
-    cov_G: Matrix3[SquareMetre] = port(np.zeros((3, 3)), "covariance of p_WG_meas")
-    seen_O: bool = port(False, "the ball is seen")
-    seen_R: bool = port(False, "the marker ring is seen, and so wrist and gripper")
     ticks: Vector6[Tick] = port(np.zeros(6), "readings: of the sensors that look across, then of those that look ahead")
     grip: Number = port(0.0, "closure of the gripper by its encoder: 0 open, 1 closed")
     dl_t: Vector9[Metre] = port(np.zeros(9), "tendon length change from calibration that is in force")

@@ -1,4 +1,4 @@
-"""Parameters of the visual servo, and what is wrong with them. [Vervloet2025] appendix A."""
+"""Parameters and measurements of the visual servo, and what is wrong with the former. [Vervloet2025] appendix A."""
 
 import math
 from dataclasses import dataclass, fields
@@ -7,7 +7,7 @@ import numpy as np
 
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.origins import assumed, derived, stated
-from handover.cosim.blocks.ports import Vector3, Vector6, Vector9, parameter
+from handover.cosim.blocks.ports import Matrix3, Vector3, Vector6, Vector9, parameter, port
 from handover.cosim.blocks.start_values import parameter_faults
 from handover.cosim.blocks.units import Metre, Number, Radian, Second, SquareMetre
 
@@ -65,7 +65,7 @@ class Params:
     seed: int = parameter(0, "seed of the jitter", minimum=0)
     alpha: Number = parameter(
         0.25,
-        "step size: part of the way to the goal in a control period",
+        "step size of the Jacobian control, eq. (21): part of the way to the goal in a control period",
         minimum=0.0,
         maximum=1.0,
         origin=assumed("with control_period half of the way in a second: the averaged command trails by half a second"),
@@ -435,3 +435,17 @@ class Params:
 
 def _text(value: object) -> str:
     return str(np.asarray(value).tolist())
+
+
+@dataclass(kw_only=True)
+class Inputs:
+    """Measurements, in W; one that is not seen is ignored."""
+
+    p_WO_meas: Vector3[Metre] = port(np.zeros(3), "measured position of the ball")
+    p_WR_meas: Vector3[Metre] = port(np.zeros(3), "measured position of the wrist")
+    p_WG_meas: Vector3[Metre] = port(np.zeros(3), "measured position of the gripper")
+    cov_O: Matrix3[SquareMetre] = port(np.zeros((3, 3)), "covariance of p_WO_meas")
+    cov_R: Matrix3[SquareMetre] = port(np.zeros((3, 3)), "covariance of p_WR_meas")
+    cov_G: Matrix3[SquareMetre] = port(np.zeros((3, 3)), "covariance of p_WG_meas")
+    seen_O: bool = port(False, "the ball is seen")
+    seen_R: bool = port(False, "the marker ring is seen, and so wrist and gripper")

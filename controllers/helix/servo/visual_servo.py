@@ -13,33 +13,19 @@ from handover.controllers.helix.servo.arm_paths import Recovery
 from handover.controllers.helix.servo.constant_curvature import W_FROM_B, forward_kinematics, linearise, tendon_lengths
 from handover.controllers.helix.servo.estimation import optimise_state, weights_of_state
 from handover.controllers.helix.servo.jacobian_control import Damping, Limits, blend, control_step, is_reachable
-from handover.controllers.helix.servo.servo_parameters import InvalidServoParameters, Params
+from handover.controllers.helix.servo.servo_parameters import Inputs, InvalidServoParameters, Params
 from handover.controllers.helix.servo.task import SAME_TIME, Phase, Task, Verdict
 from handover.controllers.helix.servo.tracking import UP, Tracker
-from handover.cosim.blocks.ports import Floats, Matrix3, Vector3, Vector9, output, port
+from handover.cosim.blocks.ports import Floats, Vector3, Vector9, output
 from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.terminals import Terminal, TerminalKind, terminal
-from handover.cosim.blocks.units import Metre, Number, Radian, SquareMetre
+from handover.cosim.blocks.units import Metre, Number, Radian
 
 __all__ = ["Inputs", "InvalidServoParameters", "Outputs", "Params", "Phase", "Verdict", "VisualServo"]
 
 _RESPONSE_MEMORY = 1.5  # s; one swing of the arm and a half (own choice)
 _LARGEST_STEP, _HALF_STEP_ERROR = 0.8, 0.08  # of the way; m, at which a growing step is half of that (own choices)
 _AT_LIMIT = 1e-6  # rad, m
-
-
-@dataclass(kw_only=True)
-class Inputs:
-    """Measurements, in W; one that is not seen is ignored."""
-
-    p_WO_meas: Vector3[Metre] = port(np.zeros(3), "measured position of the ball")
-    p_WR_meas: Vector3[Metre] = port(np.zeros(3), "measured position of the wrist")
-    p_WG_meas: Vector3[Metre] = port(np.zeros(3), "measured position of the gripper")
-    cov_O: Matrix3[SquareMetre] = port(np.zeros((3, 3)), "covariance of p_WO_meas")
-    cov_R: Matrix3[SquareMetre] = port(np.zeros((3, 3)), "covariance of p_WR_meas")
-    cov_G: Matrix3[SquareMetre] = port(np.zeros((3, 3)), "covariance of p_WG_meas")
-    seen_O: bool = port(False, "the ball is seen")
-    seen_R: bool = port(False, "the marker ring is seen, and so wrist and gripper")
 
 
 @dataclass(kw_only=True)

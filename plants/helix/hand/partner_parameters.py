@@ -93,7 +93,7 @@ class Params:
     )
     tremor_rms: Metre = parameter(
         0.001,
-        "root mean square length of the tremor",
+        "root mean square length of the hand's tremor",
         minimum=0.0,
         maximum=0.05,
         origin=assumed("physiological tremor of an outstretched hand"),
@@ -114,7 +114,7 @@ class Params:
     )
     drift_rms: Metre = parameter(
         0.003,
-        "root mean square length of the drift",
+        "root mean square length of the hand's drift",
         minimum=0.0,
         maximum=0.1,
         origin=assumed("how still a hand is held"),
