@@ -108,7 +108,7 @@ class Params:
     )
     gated: bool = parameter(
         True,
-        "it yields, signals and heeds the speed only once at rest; else as soon as it is within gate_error",
+        "the robot yields, signals and heeds the speed only once at rest; else as soon as it is within gate_error",
         origin=assumed("not given: fig. 3.1 has no condition of rest between arrival, impedance control and signal"),
     )
     gate_error: Metre = parameter(
@@ -192,7 +192,9 @@ class Params:
     attempts: int = parameter(
         5, "failed receptions, or deliveries, before it gives up", minimum=1, maximum=1000, origin=NOT_GIVEN
     )
-    patience: Second = parameter(60.0, "time in a phase before it gives up", minimum=0.1, maximum=1e5, origin=NOT_GIVEN)
+    patience: Second = parameter(
+        60.0, "time in a phase after which the robot gives up", minimum=0.1, maximum=1e5, origin=NOT_GIVEN
+    )
 
     def velocities(self) -> tuple[float, float]:
         """Return the thresholds for release and reception; 0 for one that is neither given nor stated."""

@@ -82,7 +82,7 @@ class Params(handover_parameters.Params):
     )
     together: bool = parameter(
         True,
-        "they take each step of the handover together, and heed the middle's velocity; else each for itself",
+        "the robots take each step together, and heed the middle's velocity; else each for itself",
         origin=derived("sec. 6.3: on two robots where the object could be simultaneously carried"),
     )
 

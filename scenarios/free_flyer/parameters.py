@@ -7,12 +7,22 @@ from typing import Any
 
 import numpy as np
 
-from handover.cosim.blocks.origins import NOT_GIVEN, Origin, assumed, derived, stated
-from handover.cosim.blocks.ports import Floats, Vector3, parameter
-from handover.cosim.blocks.units import Kilogram, Metre, Newton, NewtonMetre, Number, Second
+from handover.controllers.free_flyer.handover_parameters import Params as DecisionParams
+from handover.controllers.free_flyer.handover_team import Params as TeamDecisionParams
+from handover.cosim.blocks.origins import Origin, assumed, derived, stated
+from handover.cosim.blocks.ports import Floats, parameter
+from handover.cosim.blocks.units import Newton, NewtonMetre, Number, Second
 from handover.plants.free_flyer.hand.parameters import Params as PersonParams
+from handover.plants.free_flyer.large_object.parameters import Params as LargeObjectParams
 from handover.plants.free_flyer.robot.free_flyer import Params as RobotParams
+from handover.plants.free_flyer.robot.navigation import Params as NavigationParams
+from handover.plants.free_flyer.robot.push import Params as PushParams
+from handover.plants.free_flyer.robot.thrusters import Params as ThrustersParams
+from handover.scenarios.experiment.exposed import expose
 from handover.scenarios.experiment.paper import paper_values
+
+ROBOTS = ("1", "2")
+"""Numbers of two robots, by which the names of their units and ports end."""
 
 _UNSKILLED_ERRORS = 8.0
 """Errors of sight, timing and effort at skill 0, over those at skill 1 (assumed)."""
@@ -67,6 +77,12 @@ def _factor(of_what: str, origin: Origin) -> float:
     return parameter(1.0, f"{of_what}, times the public value", minimum=0.2, maximum=5.0, origin=origin)
 
 
+def _of_each(path: str) -> tuple[str, ...]:
+    """Return the path of a robot's unit, and those of two robots' units."""
+    unit, _, name = path.partition(".")
+    return (path, *(f"{unit}_{r}.{name}" for r in ROBOTS))
+
+
 _AS_PUBLISHED = assumed("the robot is as published")
 _READ_BY_THE_CONTROLLER = assumed("sec. 4.1.2: the controller reads mass and inertia from the robot's own topic")
 
@@ -117,12 +133,12 @@ class HandoverParameters(RobotAndModel):
     behaviour: Behaviour = parameter(
         Behaviour.RIGID, "setting of the impedance controller, [Fernandes2020] table 4.1", origin=stated("table 4.1")
     )
-    p_WG_handover: Vector3[Metre] = parameter(
-        np.array([0.0, -0.07, 0.0]),
-        "where the gripper waits for the person, in W",
+    p_WG_handover: Floats = expose(
+        DecisionParams,
+        "decision.p_WG_handover",
         minimum=-1.0,
         maximum=1.0,
-        origin=stated("sec. 4.1.3, 4.3.1"),
+        description="where the gripper waits for the person, in W",
     )
     strength: Newton = parameter(
         4.0,
@@ -155,51 +171,31 @@ class HandoverParameters(RobotAndModel):
             "not given; the participants had little or no practice (sec. 5.4) and failed in 0 to 15 of 100 (sec. 5.8)"
         ),
     )
-    sight_error: Metre = parameter(
-        0.002,
-        "error of a skilled person's sight, along each axis across it, standard deviation",
-        minimum=0.0,
-        maximum=0.1,
-        origin=assumed("as person.sight_error"),
-    )
-    depth_error: Metre = parameter(
-        0.006, "the same along the line of sight", minimum=0.0, maximum=0.1, origin=assumed("as person.depth_error")
-    )
-    interface_delay: Second = parameter(
-        0.05, "how old is what the person sees", minimum=0.0, maximum=2.0, origin=assumed("sec. 4.2.3: less than 0.1 s")
-    )
+    sight_error: float = expose(PersonParams, "person.sight_error", maximum=0.1)
+    depth_error: float = expose(PersonParams, "person.depth_error", maximum=0.1)
+    interface_delay: float = expose(PersonParams, "person.interface_delay", maximum=2.0)
     propulsion: Propulsion = parameter(
         Propulsion.LIMITED,
         "what the thrusters are like",
         origin=assumed("the handovers are possible within Astrobee's limits"),
     )
-    delay: Second = parameter(0.0, "delay between a command and its thrust", minimum=0.0, maximum=0.2, origin=NOT_GIVEN)
-    gradual: bool = parameter(
-        False,
-        "whether the fingers follow pull and push, and their grip fades as they open",
-        origin=derived("as decision.gradual"),
+    delay: float = expose(ThrustersParams, *_of_each("thrusters.delay"), maximum=0.2)
+    gradual: bool = expose(
+        DecisionParams,
+        "decision.gradual",
+        "person.grip_fades",
+        description="whether the fingers follow pull and push, and their grip fades as they open",
     )
-    verify: bool = parameter(
-        False,
-        "whether the robot closes its gripper again after a release, to notice an object that was not taken",
-        origin=assumed("not given: sec. 3.2 takes what was released for delivered"),
-    )
-    navigation_delay: Second = parameter(
-        0.0,
-        "age of the estimate of the robot's pose and velocities, which the controllers expect and reject where they"
-        " would be unstable with it; of one that they do not know, set navigation.delay",
-        minimum=0.0,
+    verify: bool = expose(DecisionParams, "decision.verify")
+    navigation_delay: float = expose(
+        NavigationParams,
+        *_of_each("navigation.delay"),
         maximum=0.2,
-        origin=NOT_GIVEN,
+        description="age of the estimate of the robot's pose and velocities, which the controllers expect and reject "
+        "where they would be unstable with it; of one that they do not know, set navigation.delay",
     )
-    gated: bool = parameter(
-        True,
-        "whether the robot yields and signals only once it is at rest in its place",
-        origin=assumed("as decision.gated"),
-    )
-    patience: Second = parameter(
-        60.0, "time in any one phase after which the robot gives up", minimum=1.0, maximum=600.0, origin=NOT_GIVEN
-    )
+    gated: bool = expose(DecisionParams, "decision.gated")
+    patience: float = expose(DecisionParams, "decision.patience", minimum=1.0, maximum=600.0)
 
     @property
     def is_led(self) -> bool:
@@ -224,7 +220,6 @@ class HandoverParameters(RobotAndModel):
             "effort_spread": worse * skilled["effort_spread"],
             "haste": _HASTE * (1.0 - self.skill),
             "reaction_time": (2.0 - self.skill) * skilled["reaction_time"],
-            "interface_delay": self.interface_delay,
         }
 
 
@@ -255,10 +250,6 @@ class TeamTask(_OfUnit):
     HUMAN_TO_ROBOTS = 1
 
 
-ROBOTS = ("1", "2")
-"""Numbers of two robots, by which the names of their units and ports end."""
-
-
 class Hands(_OfUnit):
     """With which hands the person holds a large object, and where."""
 
@@ -274,49 +265,28 @@ class TeamParameters(HandoverParameters):
     task: TeamTask = parameter(
         TeamTask.ROBOTS_TO_HUMAN, "who gives the object to whom", origin=assumed("sec. 4.3.1: the first of the two")
     )
-    p_WG_handover: Vector3[Metre] = parameter(
-        np.array([0.28, 0.0, 0.0]),
-        "where the middle between the grippers waits for the person, in W",
+    p_WG_handover: Floats = expose(
+        TeamDecisionParams,
+        "decision.p_WG_handover",
         minimum=-1.0,
         maximum=1.0,
-        origin=assumed("as team_decision.p_WG_handover"),
+        description="where the middle between the grippers waits for the person, in W",
     )
-    strength: Newton = parameter(
-        4.0,
-        "force with which each hand of the person pulls; with half of it, pushes",
-        minimum=0.1,
-        maximum=20.0,
-        origin=assumed(
-            "not given: with ideal thrust it moves the rigid robot by about the 40 mm of sec. 4.3.1, "
-            "which it was chosen for"
-        ),
+    strength: float = expose(
+        HandoverParameters,
+        "strength",
+        description="force with which each hand of the person pulls; with half of it, pushes",
     )
-    hand: Hand = parameter(
-        Hand.SIMULATED,
-        "who moves the person's hands: here a simulated person alone",
-        origin=assumed("sec. 4.2: hands of users lead it; without one at hand, a simulated person"),
+    hand: Hand = expose(
+        HandoverParameters, "hand", description="who moves the person's hands: here a simulated person alone"
     )
-    hand_track: str = parameter(
-        "",
-        "always empty here: a track leads one hand",
-        origin=assumed("sec. 4.2: hands of users lead it, whose tracks are not given"),
-    )
+    hand_track: str = expose(HandoverParameters, "hand_track", description="always empty here: a track leads one hand")
     hands: Hands = parameter(
         Hands.TWO, "with which hands the person holds the object, and where", origin=derived("sec. 6.3: both hands")
     )
-    hand_delay: Second = parameter(
-        0.0,
-        "how much later than the first the second hand closes and opens",
-        minimum=0.0,
-        maximum=5.0,
-        origin=assumed("both hands close at once"),
-    )
-    together: bool = parameter(
-        True, "whether the robots decide together; else each for itself", origin=derived("as team_decision.together")
-    )
-    object_mass: Kilogram = parameter(
-        3.0, "mass of the object", minimum=0.1, maximum=50.0, origin=assumed("as large_object.object_mass")
-    )
+    hand_delay: float = expose(LargeObjectParams, "person.hand_delay", maximum=5.0)
+    together: bool = expose(TeamDecisionParams, "decision.together")
+    object_mass: float = expose(LargeObjectParams, "person.object_mass", minimum=0.1, maximum=50.0)
 
     @property
     def hand_numbers(self) -> tuple[str, ...]:
@@ -343,43 +313,38 @@ class Wrench(enum.IntEnum):
 class ImpedanceParameters(RobotAndModel):
     """One push."""
 
-    behaviour: Behaviour = parameter(
-        Behaviour.RIGID, "setting of the impedance controller, [Fernandes2020] table 4.1", origin=stated("table 4.1")
-    )
+    behaviour: Behaviour = expose(HandoverParameters, "behaviour")
     kind: Wrench = parameter(
         Wrench.FORCE, "whether the gripper is pushed or twisted", origin=stated("sec. 4.1.3: forces and torques")
     )
     axis: Axis = parameter(Axis.X, "axis of W of the push", origin=stated("figs. 4.5-4.16: each axis"))
-    force: Newton = parameter(
-        5.0, "force of a push", minimum=-50.0, maximum=50.0, origin=stated("figs. 4.5-4.7, 4.11-4.13")
-    )
+    force: float = expose(PushParams, "push.force", minimum=-50.0, maximum=50.0)
     torque: NewtonMetre = parameter(
         3.0, "torque of a twist", minimum=-10.0, maximum=10.0, origin=stated("figs. 4.8-4.10, 4.14-4.16")
     )
-    begin: Second = parameter(1.0, "when the push begins", minimum=0.0, maximum=60.0, origin=NOT_GIVEN)
-    duration: Second = parameter(
-        0.5, "how long the push lasts", minimum=0.0, maximum=60.0, origin=assumed("not given in the text")
-    )
-    propulsion: Propulsion = parameter(
-        Propulsion.IDEAL,
-        "what the thrusters are like; the published plots need ideal ones",
+    begin: float = expose(PushParams, "push.start", maximum=60.0)
+    duration: float = expose(PushParams, "push.duration", maximum=60.0)
+    propulsion: Propulsion = expose(
+        HandoverParameters,
+        "propulsion",
+        start=Propulsion.IDEAL,
+        description="what the thrusters are like; the published plots need ideal ones",
         origin=derived("derived from the plots of sec. 4.1.3: with Astrobee's limits the robot tumbles at 3 N m"),
     )
-    delay: Second = parameter(0.0, "delay between a command and its thrust", minimum=0.0, maximum=0.2, origin=NOT_GIVEN)
-    navigation_delay: Second = parameter(
-        0.0,
-        "age of the estimate of the robot's pose and velocities, which the controller expects if delay_known",
-        minimum=0.0,
-        maximum=0.2,
-        origin=NOT_GIVEN,
+    delay: float = expose(HandoverParameters, "delay")
+    navigation_delay: float = expose(
+        HandoverParameters,
+        "navigation_delay",
+        description="age of the estimate of the robot's pose and velocities, which the controller expects if "
+        "delay_known",
     )
     delay_known: bool = parameter(
         True,
         "whether the controller knows both delays, and rejects ones it is unstable with",
         origin=assumed("delays that are known are part of the controller's stability check"),
     )
-    patience: Second = parameter(
-        60.0, "time after the push by which the robot must rest", minimum=1.0, maximum=600.0, origin=NOT_GIVEN
+    patience: float = expose(
+        HandoverParameters, "patience", description="time after the push by which the robot must rest"
     )
     parallel_step: Second = parameter(
         0.002,

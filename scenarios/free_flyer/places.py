@@ -57,7 +57,6 @@ def _thrusters(*controllers: str) -> Place:
         required={**commands, **_WRENCH, "saturated": "its share of the run is a metric"},
         optional={
             "propulsion": "the scenario's parameter",
-            "delay": "the scenario's parameter",
             "flapper_range": "0 of a nozzle that is stuck",
         },
         remarks=_FRAMES,
@@ -76,7 +75,7 @@ _ROBOT = Place(
 )
 _NAVIGATION = Place(
     required=_ESTIMATE,
-    optional={**_TRUTH, "seed": "follows from the run's seed", "delay": "the scenario's parameter navigation_delay"},
+    optional={**_TRUTH, "seed": "follows from the run's seed"},
     remarks=_FRAMES,
 )
 
@@ -85,7 +84,7 @@ PLACES_OF_PUSH = {
     "thrusters": _thrusters("impedance"),
     "push": Place(
         required=_ON_GRIPPER,
-        optional=dict.fromkeys(("axis", "force", "torque", "start", "duration"), "the scenario's parameter"),
+        optional=dict.fromkeys(("axis", "torque"), "the scenario's parameter"),
         remarks=_FRAMES,
     ),
     "robot": _ROBOT,
@@ -110,7 +109,6 @@ PLACES_OF_ARM_PUSH = {
             "q_J": "",
             "v_J": "",
             "q_J_goal": "the scenario's parameter posture",
-            "rotational_damping": "the scenario's parameter",
         },
         remarks=_FRAMES,
     ),
@@ -120,9 +118,7 @@ PLACES_OF_ARM_PUSH = {
             **_ROBOT.optional,
             **_ARM,
             "q_J_0": "the scenario's parameter posture",
-            "tolerance_J": "the scenario's parameter",
             "friction_J": "the scenario's parameter",
-            "lock_time": "the scenario's parameter",
             "f_Q": "in W, of a person's push on the gripper in a live page, which cannot push it without",
             "p_GQ": "in G, where that acts",
         },
@@ -148,10 +144,7 @@ PLACES_OF_HANDOVER = {
             **_ESTIMATE,
             "gripper_angle": "",
             "failed_deliveries": "a metric, 0 without it",
-            **dict.fromkeys(
-                ("task", "behaviour", "p_WG_handover", "gated", "gradual", "verify", "patience"),
-                "the scenario's, or its parameter's value",
-            ),
+            **dict.fromkeys(("task", "behaviour"), "the scenario's, or its parameter's value"),
             "p_BG": "in B",
             "p_WO_0": "in W",
             "p_OG": "from the object's centre, in W",
@@ -198,13 +191,11 @@ PLACES_OF_HANDOVER = {
             ),
             "effort": "the scenario's parameter strength",
             "arm_force_max": "follows from the scenario's parameter strength",
-            "grip_fades": "the scenario's parameter gradual",
             **dict.fromkeys(("sight_error", "depth_error"), "the scenario's parameter, times what skill makes of it"),
             **dict.fromkeys(
                 ("timing_error", "effort_spread", "haste", "reaction_time"),
                 "follows from the scenario's parameter skill",
             ),
-            "interface_delay": "the scenario's parameter",
         },
         remarks=_FRAMES,
     ),
@@ -243,10 +234,7 @@ PLACES_OF_TEAM = {
         ),
         optional={
             **_of_each({**_ESTIMATE, "gripper_angle": "", "failed_deliveries": "a metric, 0 without it"}),
-            **dict.fromkeys(
-                ("task", "behaviour", "p_WG_handover", "gated", "gradual", "verify", "patience", "together"),
-                "the scenario's parameter, or follows from it",
-            ),
+            **dict.fromkeys(("task", "behaviour"), "the scenario's parameter, or follows from it"),
             "p_BG": "in B",
             "p_WO_0": "in W",
             "p_OG": "in the object's frame, the middle between its handles",
@@ -283,14 +271,12 @@ PLACES_OF_TEAM = {
             "seed": "follows from the run's seed",
             "p_WO_0": "in W",
             "angle_0": "",
-            **dict.fromkeys(("object_mass", "hand_delay", "interface_delay"), "the scenario's parameter"),
             "p_OG": "as the unit decision has it",
             "grip_spacing": "as the unit decision has it",
             **dict.fromkeys(("hands", "p_OH"), "follows from the scenario's parameter hands"),
             **dict.fromkeys(
                 ("effort", "arm_force_max"), "follows from the scenario's parameter strength, of each hand"
             ),
-            "grip_fades": "the scenario's parameter gradual",
             **dict.fromkeys(("sight_error", "depth_error"), "the scenario's parameter, times what skill makes of it"),
             **dict.fromkeys(
                 ("timing_error", "reaction_time", "effort_spread", "haste"),

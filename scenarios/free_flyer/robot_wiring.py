@@ -74,13 +74,13 @@ def expected_lag(propulsion: Propulsion) -> float:
     return float(values["flapper_lag" if propulsion is Propulsion.NOZZLES else "lag"])
 
 
-def thruster_settings(propulsion: Propulsion, delay: float, stuck_nozzle: int) -> dict[str, Any]:
+def thruster_settings(propulsion: Propulsion, stuck_nozzle: int) -> dict[str, Any]:
     """Return the parameters of the thrusters' unit.
 
     Raises:
         InvalidParameter: a nozzle is stuck of thrusters that have none.
     """
-    settings: dict[str, Any] = {"propulsion": propulsion.item, "delay": delay}
+    settings: dict[str, Any] = {"propulsion": propulsion.item}
     if stuck_nozzle == 0:
         return settings
     if propulsion is not Propulsion.NOZZLES:
@@ -162,9 +162,8 @@ def common_period(controllers: Sequence[PlacedUnit]) -> Fraction | None:
 
 
 def decision_settings(p: HandoverParameters) -> dict[str, Any]:
-    """Return the parameters of the unit that decides, as far as the scenario's say them."""
-    names = ("p_WG_handover", "gated", "gradual", "verify", "patience")
-    return {"behaviour": p.behaviour.item, "p_BG": p.model.p_BG, **{name: getattr(p, name) for name in names}}
+    """Return the parameters of the unit that decides, as far as they follow from the scenario's."""
+    return {"behaviour": p.behaviour.item, "p_BG": p.model.p_BG}
 
 
 def note_own_limits(s: System, controller: PlacedUnit, propulsion: Propulsion) -> None:
@@ -200,12 +199,12 @@ def add_robot(
     suffix: str = "",
 ) -> None:
     """Add a robot, its gripper at p_WG_0, m in W, its thrusters and its navigation, whose noise has the seed."""
-    settings = thruster_settings(p.propulsion, p.delay, p.stuck_nozzle)
+    settings = thruster_settings(p.propulsion, p.stuck_nozzle)
     s.add(f"thrusters{suffix}", fmu(f"thrusters{suffix}"), period=period, **settings)
     robot = p.robot
     s.add(f"robot{suffix}", fmu(f"robot{suffix}"), period=period, **vars(robot), p_WB_0=p_WG_0 - robot.p_BG)
     navigation = f"navigation{suffix}"
-    s.add(navigation, fmu(navigation), period=period, seed=seed, delay=p.navigation_delay)
+    s.add(navigation, fmu(navigation), period=period, seed=seed)
 
 
 def wire_navigation(s: System, robot: PlacedUnit, navigation: PlacedUnit) -> None:
@@ -264,12 +263,12 @@ def wired_push(
         "lag": expected_lag(p.propulsion),
     }
     impedance = s.add("impedance", fmu("impedance"), **lateness, **controller, active=True)
-    thrusters = s.add("thrusters", fmu("thrusters"), **thruster_settings(p.propulsion, p.delay, p.stuck_nozzle))
+    thrusters = s.add("thrusters", fmu("thrusters"), **thruster_settings(p.propulsion, p.stuck_nozzle))
     pushed: dict[str, Any] = {"force": p.force if is_force else 0.0, "torque": 0.0 if is_force else p.torque}
     note_own_limits(s, impedance, p.propulsion)
-    push = s.add("push", fmu("push"), axis=p.axis.name.lower(), **pushed, start=p.begin, duration=p.duration)
+    push = s.add("push", fmu("push"), axis=p.axis.name.lower(), **pushed)
     body = s.add("robot", fmu("robot"), **robot)
-    navigation = s.add("navigation", fmu("navigation"), seed=seed, delay=p.navigation_delay)
+    navigation = s.add("navigation", fmu("navigation"), seed=seed)
     wire_controller(s, impedance, navigation, thrusters)
     wire_navigation(s, body, navigation)
     wire_forces(s, body, thrusters, push)

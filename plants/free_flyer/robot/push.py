@@ -31,7 +31,9 @@ class Params:
         "axis of the world along which force and torque act",
         origin=stated("figs. 4.5 and 4.11; the others show the other axes"),
     )
-    force: Newton = parameter(5.0, "force", minimum=-1000.0, maximum=1000.0, origin=stated("figs. 4.5-4.7, 4.11-4.13"))
+    force: Newton = parameter(
+        5.0, "force of a push", minimum=-1000.0, maximum=1000.0, origin=stated("figs. 4.5-4.7, 4.11-4.13")
+    )
     torque: NewtonMetre = parameter(
         0.0,
         "torque",
@@ -41,7 +43,7 @@ class Params:
     )
     start: Second = parameter(1.0, "when the push begins", minimum=0.0, maximum=1e6, origin=NOT_GIVEN)
     duration: Second = parameter(
-        0.5, "how long it lasts", minimum=0.0, maximum=1e6, origin=assumed("not given in the text")
+        0.5, "how long the push lasts", minimum=0.0, maximum=1e6, origin=assumed("not given in the text")
     )
 
 

@@ -62,7 +62,9 @@ class Params:
         origin=stated("Astrobee, about"),
     )
     lag: Second = parameter(0.02, "time constant of the first-order lag", minimum=0.0, maximum=10.0, origin=NOT_GIVEN)
-    delay: Second = parameter(0.0, "how long a command takes to arrive", minimum=0.0, maximum=10.0, origin=NOT_GIVEN)
+    delay: Second = parameter(
+        0.0, "delay between a command and its thrust", minimum=0.0, maximum=10.0, origin=NOT_GIVEN
+    )
     propulsion: Propulsion = parameter(
         Propulsion.LIMITED,
         "without limits or lag, with both, or by nozzles; all delay",

@@ -124,7 +124,6 @@ class FlyerHandover(Experiment[HandoverEvaluator]):
             p_WO_0=p_WO_0,
             angle_0=float(at["angle_0"]),
             **p.traits,
-            grip_fades=p.gradual,
             **self.person,
             **leader(p, float(self.stop_time(p))),
         )

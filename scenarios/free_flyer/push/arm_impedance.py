@@ -61,9 +61,7 @@ class FlyerArmImpedance(Experiment[ArmImpedanceEvaluator]):
             **vars(p.robot),
             **p.arm(p.arm_factor),
             "q_J_0": p.posture,
-            "tolerance_J": p.tolerance,
             "friction_J": np.full(3, p.friction),
-            "lock_time": p.lock_time,
             "p_WB_0": target.p_WG - p_BG,
         }
         s = wired_push(fmu, p, seed, controller, robot)

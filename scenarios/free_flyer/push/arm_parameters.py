@@ -9,9 +9,11 @@ from handover.controllers.free_flyer.arm_impedance_controller import Params as C
 from handover.controllers.free_flyer.arm_model import ArmModel, Chain
 from handover.controllers.free_flyer.gains import ImpedanceGains
 from handover.controllers.free_flyer.ports import Behaviour as ControllerBehaviour
-from handover.cosim.blocks.origins import NOT_GIVEN, assumed, stated
+from handover.cosim.blocks.origins import NOT_GIVEN, assumed
 from handover.cosim.blocks.ports import Floats, Vector3, parameter
-from handover.cosim.blocks.units import NewtonMetre, NewtonMetreSecondPerRadian, Number, Radian, Second
+from handover.cosim.blocks.units import NewtonMetre, Number, Radian
+from handover.plants.free_flyer.robot.free_flyer import Params as RobotParams
+from handover.scenarios.experiment.exposed import expose
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.free_flyer.parameters import Axis, Body, ImpedanceParameters
 
@@ -43,9 +45,7 @@ class ArmPushParameters(ImpedanceParameters):
         "axis of W of the push",
         origin=assumed("sec. 4.1.3: all three; across the arm its joints give way most"),
     )
-    joints: int = parameter(
-        2, "number of the arm's joints", minimum=1, maximum=3, origin=stated("Astrobee's perching arm")
-    )
+    joints: int = expose(ControllerParams, "impedance.joints", "robot.joints", minimum=1)
     posture: Vector3[Radian] = parameter(
         np.array([0.6, 0.5, -0.6]),
         "angles of the joints at the start, to which they go back",
@@ -53,24 +53,10 @@ class ArmPushParameters(ImpedanceParameters):
         maximum=1.5,
         origin=assumed("not given: a bent arm, of which no joint is at a limit"),
     )
-    tolerance: Radian = parameter(
-        10.0,
-        "how far the drives let the joints go; 0: fixed joints, as in the thesis",
-        minimum=0.0,
-        maximum=10.0,
-        origin=assumed("sec. 4.1.2 fixes the joints; here they move"),
-    )
-    rotational_damping: NewtonMetreSecondPerRadian = parameter(
-        1.0,
-        "rotational k_B; the 5 of table 4.1's rigid setting is unstable on Astrobee's arm",
-        minimum=0.0,
-        maximum=20.0,
-        origin=assumed("table 4.1, compliant; the rigid setting's 5 is unstable with joints at 62.5 Hz"),
-    )
+    tolerance: float = expose(RobotParams, "robot.tolerance_J", minimum=0.0)
+    rotational_damping: float = expose(ControllerParams, "impedance.rotational_damping", maximum=20.0)
     friction: NewtonMetre = parameter(0.0, "dry friction of the joints", minimum=0.0, maximum=1.0, origin=NOT_GIVEN)
-    lock_time: Second = parameter(
-        1e6, "when the joints lock where they are", minimum=0.0, maximum=1e6, origin=assumed("never")
-    )
+    lock_time: float = expose(RobotParams, "robot.lock_time")
     model_link_factor: Number = parameter(
         1.0,
         "mass and inertia of the links that the controller assumes, times the public ones",
@@ -93,7 +79,7 @@ class ArmPushParameters(ImpedanceParameters):
     def controller(self) -> dict[str, Any]:
         """Return parameters of the controller: with fixed joints, those of the whole as one body about B."""
         arm = self.arm(self.model_arm_factor, self.model_link_factor)
-        common = {"behaviour": self.behaviour.item, "rotational_damping": self.rotational_damping}
+        common = {"behaviour": self.behaviour.item}
         moving = {**common, **vars(self.model), **arm, "q_J_goal": self.posture}
         if not self.fixed:
             return moving

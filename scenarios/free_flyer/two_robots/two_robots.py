@@ -97,7 +97,6 @@ class TwoRobots(Experiment[TeamEvaluator]):
             fmu("decision"),
             task=task,
             p_WO_0=at["p_WO_0"],
-            together=p.together,
             **grips,
             **decision_settings(p),
         )
@@ -113,10 +112,7 @@ class TwoRobots(Experiment[TeamEvaluator]):
             seed=person_seed,
             p_WO_0=at["p_WO_0"],
             angle_0=float(at["angle_0"]),
-            object_mass=p.object_mass,
-            hand_delay=p.hand_delay,
             **p.traits,
-            grip_fades=p.gradual,
             **grips,
             **motion,
             **_hold(p),

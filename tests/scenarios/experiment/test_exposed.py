@@ -72,7 +72,8 @@ def test_what_is_exposed_is_optional_of_a_place():
 def test_the_units_of_a_scenario_take_what_it_exposes(name: str):
     scenario = SCENARIOS[name]
     annotated = typing.get_type_hints(scenario.parameters_type)
-    for own, unit, of_unit in exposed(scenario.parameters_type):
+    paths = [path for path in exposed(scenario.parameters_type) if path[1] in scenario.units]
+    for own, unit, of_unit in paths:
         [v] = [v for v in scenario.parameters() if v.name == own]
         declared = {v.name: v for v in describe(import_class(find_unit(scenario.units[unit]).block)).parameters}
         taken = declared[of_unit]
