@@ -17,7 +17,7 @@ from handover.controllers.vsl.feedback import (
     VibrationDamping,
     is_moving,
 )
-from handover.controllers.vsl.kinematics import Elbow, VslKinematics
+from handover.controllers.vsl.kinematics import ArmParameters, Elbow, VslKinematics
 from handover.controllers.vsl.learned_model import Learned, VslModel
 from handover.controllers.vsl.model_text import InvalidModel, read_model
 from handover.cosim.blocks.block import InvalidParameters
@@ -80,7 +80,7 @@ class Imu(enum.IntEnum):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Params:
+class Params(ArmParameters):
     """Method, model and arm; the lengths are assumed."""
 
     method: Method = parameter(Method.HYBRID, "rigid kinematics, with what was learned, or with its estimate only")
@@ -113,28 +113,6 @@ class Params:
         False,
         "turn the joints against swings that the path's changes of speed excite",
         origin=stated("sec. VI names models of the dynamics as future work"),
-    )
-    elbow: Elbow = parameter(Elbow.UP, "which way the elbow points")
-    L_1: Metre = parameter(
-        0.15,
-        "height of the shoulder",
-        minimum=0.0,
-        maximum=10.0,
-        origin=assumed("the controller knows the arm's dimensions, which are not given"),
-    )
-    L_2: Metre = parameter(
-        0.225,
-        "length of link 2",
-        minimum=0.001,
-        maximum=10.0,
-        origin=assumed("the controller knows the arm's dimensions, which are not given"),
-    )
-    L_3: Metre = parameter(
-        0.225,
-        "length of link 3",
-        minimum=0.001,
-        maximum=10.0,
-        origin=assumed("the controller knows the arm's dimensions, which are not given"),
     )
     i_lag: Second = parameter(
         0.2,

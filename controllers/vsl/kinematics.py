@@ -6,7 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handover.cosim.blocks.ports import Floats
+from handover.cosim.blocks.origins import assumed, read_off
+from handover.cosim.blocks.ports import Floats, parameter
+from handover.cosim.blocks.units import Metre
+
+_KNOWN = assumed("the controller knows the arm's dimensions, which are not given")
 
 
 class Elbow(enum.IntEnum):
@@ -19,6 +23,20 @@ class Elbow(enum.IntEnum):
     def sign(self) -> float:
         """Lambda: 1 with the elbow up, -1 with it down."""
         return 1.0 if self is Elbow.UP else -1.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class ArmParameters:
+    """What each unit that computes with rigid links declares of the arm."""
+
+    elbow: Elbow = parameter(
+        Elbow.UP,
+        "which way the elbow points; down, it is below the ground on the paper's paths",
+        origin=read_off("fig. 1(a) shows the elbow above the line from shoulder to tip"),
+    )
+    L_1: Metre = parameter(0.15, "height of the shoulder", minimum=0.0, maximum=10.0, origin=_KNOWN)
+    L_2: Metre = parameter(0.225, "length of link 2", minimum=0.001, maximum=10.0, origin=_KNOWN)
+    L_3: Metre = parameter(0.225, "length of link 3", minimum=0.001, maximum=10.0, origin=_KNOWN)
 
 
 class Unreachable(ValueError):

@@ -8,10 +8,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from handover.controllers.vsl.kinematics import Elbow, VslKinematics, format_point
+from handover.controllers.vsl.kinematics import ArmParameters, VslKinematics, format_point
 from handover.controllers.vsl.paths import Line
 from handover.cosim.blocks.block import InvalidParameters
-from handover.cosim.blocks.origins import assumed, read_off
+from handover.cosim.blocks.origins import assumed
 from handover.cosim.blocks.ports import Floats, Vector2, Vector3, output, parameter, port
 from handover.cosim.blocks.start_values import parameter_faults
 from handover.cosim.blocks.state import pack_state, unpack_state
@@ -39,7 +39,7 @@ PHASES = ("settle", "descend", "grasp", "lift", "carry", "soften", "lower", "rel
 
 
 @dataclass(frozen=True, kw_only=True)
-class Params:
+class Params(ArmParameters):
     """The task, speeds and pressures. [Gandarias2020] has no such experiment: all are assumed."""
 
     p_WP: Vector3[Metre] = parameter(
@@ -120,32 +120,6 @@ class Params:
         minimum=0.0,
         maximum=100.0,
         origin=assumed("initial joint velocities of algorithms 1 and 2, not given"),
-    )
-    elbow: Elbow = parameter(
-        Elbow.UP,
-        "which way the elbow points",
-        origin=read_off("fig. 1(a) shows the elbow above the line from shoulder to tip"),
-    )
-    L_1: Metre = parameter(
-        0.15,
-        "height of the shoulder",
-        minimum=0.0,
-        maximum=10.0,
-        origin=assumed("the controller knows the arm's dimensions, which are not given"),
-    )
-    L_2: Metre = parameter(
-        0.225,
-        "length of link 2",
-        minimum=0.001,
-        maximum=10.0,
-        origin=assumed("the controller knows the arm's dimensions, which are not given"),
-    )
-    L_3: Metre = parameter(
-        0.225,
-        "length of link 3",
-        minimum=0.001,
-        maximum=10.0,
-        origin=assumed("the controller knows the arm's dimensions, which are not given"),
     )
 
 

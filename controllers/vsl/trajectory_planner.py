@@ -10,11 +10,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from handover.controllers.vsl.kinematics import Elbow, VslKinematics, format_point
+from handover.controllers.vsl.kinematics import ArmParameters, Elbow, VslKinematics, format_point
 from handover.controllers.vsl.paths import Path, Segment, segments_of
 from handover.controllers.vsl.waypoints import InvalidWaypoints, read_waypoints
 from handover.cosim.blocks.block import InvalidParameters
-from handover.cosim.blocks.origins import assumed, read_off, stated
+from handover.cosim.blocks.origins import assumed, stated
 from handover.cosim.blocks.ports import Floats, Vector2, Vector3, output, parameter, port
 from handover.cosim.blocks.schedule import InvalidSchedule, Schedule
 from handover.cosim.blocks.start_values import parameter_faults
@@ -40,7 +40,7 @@ class InvalidPath(InvalidParameters):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Params:
+class Params(ArmParameters):
     """Path and speed. [Gandarias2020] states neither the arm's lengths nor speeds: they are assumed."""
 
     path: Path = parameter(
@@ -75,32 +75,6 @@ class Params:
         minimum=1e-4,
         maximum=2.0,
         origin=assumed("V of algorithms 1 and 2 is not given"),
-    )
-    elbow: Elbow = parameter(
-        Elbow.UP,
-        "which way the elbow points; down, it is below the ground on the paper's paths",
-        origin=read_off("fig. 1(a) shows the elbow above the line from shoulder to tip"),
-    )
-    L_1: Metre = parameter(
-        0.15,
-        "height of the shoulder",
-        minimum=0.0,
-        maximum=10.0,
-        origin=assumed("the controller knows the arm's dimensions, which are not given"),
-    )
-    L_2: Metre = parameter(
-        0.225,
-        "length of link 2",
-        minimum=0.001,
-        maximum=10.0,
-        origin=assumed("the controller knows the arm's dimensions, which are not given"),
-    )
-    L_3: Metre = parameter(
-        0.225,
-        "length of link 3",
-        minimum=0.001,
-        maximum=10.0,
-        origin=assumed("the controller knows the arm's dimensions, which are not given"),
     )
     pressure: Vector2[Pascal] = parameter(
         np.array([5e4, 5e4]), "pressure of links 2 and 3 above the air's", minimum=0.0, maximum=MAX_PRESSURE

@@ -2,14 +2,13 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.cameras import CamerasAndMarkers
 from handover.cosim.blocks.origins import assumed, derived
-from handover.cosim.blocks.ports import Vector3, parameter
+from handover.cosim.blocks.ports import parameter
 from handover.cosim.blocks.start_values import parameter_faults
 from handover.cosim.blocks.units import Levels, Metre, Number, Pixel, Second
+from handover.plants.helix.hand.bowl import BowlParameters
 
 _UNCOVERED = derived("undisturbed: no lens is covered")
 
@@ -21,7 +20,7 @@ class InvalidCameraParameters(InvalidParameters):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Params(CamerasAndMarkers):
+class Params(CamerasAndMarkers, BowlParameters):
     """Calibration, optics and the visible things' sizes.
 
     [Vervloet2025] states where the cameras stand, about: side by side, behind the arm, at the gripper's height, and the
@@ -118,23 +117,6 @@ class Params(CamerasAndMarkers):
         minimum=0.0,
         maximum=1.0,
         origin=derived("undisturbed: no card"),
-    )
-    p_WD: Vector3[Metre] = parameter(
-        np.array([0.0, -0.16, -0.78]),
-        "middle of the bowl's rim in the world, where there is a bowl",
-        origin=assumed(
-            "own choice for the unit by itself, of no effect while bowl_radius is 0; helix_use_case sets it"
-        ),
-    )
-    bowl_radius: Metre = parameter(
-        0.0,
-        "radius of the bowl's rim; 0: there is no bowl",
-        minimum=0.0,
-        maximum=1.0,
-        origin=derived("secs. 3.5.1 and 3.5.3: only the third experiment has a bowl"),
-    )
-    bowl_depth: Metre = parameter(
-        0.06, "depth of the bowl", minimum=0.001, maximum=1.0, origin=assumed("size of a bowl")
     )
     seed: int = parameter(0, "seed of the noise", minimum=0)
 

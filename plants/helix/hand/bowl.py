@@ -5,10 +5,36 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handover.cosim.blocks.ports import Floats
+from handover.cosim.blocks.origins import assumed, derived
+from handover.cosim.blocks.ports import Floats, Vector3, parameter
+from handover.cosim.blocks.units import Metre
 
 _ROLLING_TIME = 0.25
 """Time in which a ball that rolls in the bowl loses most of its speed, s (assumed)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class BowlParameters:
+    """What the unit in which a ball falls into the bowl and the one that sees it declare of it."""
+
+    p_WD: Vector3[Metre] = parameter(
+        np.array([0.0, -0.16, -0.78]),
+        "middle of the bowl's rim in the world, where there is a bowl",
+        minimum=-2.0,
+        origin=assumed(
+            "own choice for the unit by itself, of no effect while bowl_radius is 0; helix_use_case sets it"
+        ),
+    )
+    bowl_radius: Metre = parameter(
+        0.0,
+        "radius of the bowl's rim; 0: there is no bowl",
+        minimum=0.0,
+        maximum=1.0,
+        origin=derived("secs. 3.5.1 and 3.5.3: only the third experiment has a bowl"),
+    )
+    bowl_depth: Metre = parameter(
+        0.06, "depth of the bowl", minimum=0.001, maximum=1.0, origin=assumed("size of a bowl")
+    )
 
 
 @dataclass(frozen=True)

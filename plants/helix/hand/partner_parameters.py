@@ -23,6 +23,7 @@ from handover.cosim.blocks.units import (
     Second,
     SecondPerMetre,
 )
+from handover.plants.helix.hand.bowl import BowlParameters
 
 
 class InvalidPartnerParameters(InvalidParameters):
@@ -40,7 +41,7 @@ class Holder(enum.IntEnum):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Params:
+class Params(BowlParameters):
     """Where the ball is offered and how still, how hand, ball and fingers touch, and the bowl; all assumed."""
 
     p_WO_0: Vector3[Metre] = parameter(
@@ -270,24 +271,6 @@ class Params:
         minimum=-100.0,
         maximum=2.0,
         origin=assumed("own choice: half a metre below the hanging gripper"),
-    )
-    p_WD: Vector3[Metre] = parameter(
-        np.array([0.0, -0.16, -0.78]),
-        "middle of the bowl's rim in the world, where there is a bowl",
-        minimum=-2.0,
-        origin=assumed(
-            "own choice for the unit by itself, of no effect while bowl_radius is 0; helix_use_case sets it"
-        ),
-    )
-    bowl_radius: Metre = parameter(
-        0.0,
-        "radius of the bowl's rim; 0: there is no bowl",
-        minimum=0.0,
-        maximum=1.0,
-        origin=derived("secs. 3.5.1 and 3.5.3: only the third experiment has a bowl"),
-    )
-    bowl_depth: Metre = parameter(
-        0.06, "depth of the bowl", minimum=0.001, maximum=1.0, origin=assumed("size of a bowl")
     )
     ball_radius: Metre = parameter(
         0.025, "radius of the ball", minimum=0.001, origin=assumed("figs. 4 and 6, as the cameras see it")
