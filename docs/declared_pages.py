@@ -164,10 +164,7 @@ def _enumerations(variables: Iterable[Variable]) -> list[type[enum.IntEnum]]:
 _WITHOUT_ORIGIN = {
     "seed": "follows from the run's seed",
     **dict.fromkeys(("hinges", "hinges_dynamic", "substep", "high_frequency_damping"), "numerical"),
-    **dict.fromkeys(
-        ("elbow", "link_2", "link_3", "method", "motion", "path", "pressure", "waypoints", "x_0", "x_g"),
-        "set by the scenarios",
-    ),
+    **dict.fromkeys(("link_2", "link_3", "method", "pressure"), "set by the scenarios"),
 }
 """What is said of parameters that declare no origin."""
 

@@ -60,7 +60,9 @@ class Params(ArmParameters):
         origin=assumed("start of a path of one's own; the paper's curve starts there"),
     )
     x_g: Vector3[Metre] = parameter(
-        np.array([0.3, 0.0, 0.35]), "last point of a CUSTOM path in the world, z at least 0"
+        np.array([0.3, 0.0, 0.35]),
+        "last point of a CUSTOM path in the world, z at least 0",
+        origin=assumed("end of a path of one's own"),
     )
     N: int = parameter(
         100,

@@ -16,9 +16,9 @@ WITHOUT_ORIGIN = {
         ("HandoverPartner", "StereoCamera", "FingerInfrared", "VisualServo", "Navigation", "HandAndObject"), "seed"
     ),
     **dict.fromkeys(("LargeObjectAndHands", "GraspScene"), "seed"),
-    "VslArm": "high_frequency_damping hinges hinges_dynamic link_2 link_3 motion seed substep",
-    "TrajectoryPlanner": "elbow path pressure waypoints x_0 x_g",
-    "HybridKinematics": "elbow method",
+    "VslArm": "high_frequency_damping hinges hinges_dynamic link_2 link_3 seed substep",
+    "TrajectoryPlanner": "pressure",
+    "HybridKinematics": "method",
 }
 """Parameters of units that are neither published nor assumed: seeds, numerical ones, and what scenarios set."""
 
