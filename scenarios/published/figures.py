@@ -108,7 +108,7 @@ class Panel:
 
     Attributes:
         marks: in their order.
-        axes: title, labels, limits, scales.
+        axes: title, labels, limits, scales, of which a vertical one may be a pair of its name and options.
         x_ticks, y_ticks: places and texts of ticks, which are then the only ones.
         small: whether these texts are small.
     """
@@ -123,7 +123,11 @@ class Panel:
         """Draw it."""
         for mark in self.marks:
             mark.draw(axes)
-        axes.set(**self.axes)
+        given = dict(self.axes)
+        if isinstance(given.get("yscale"), tuple):
+            scale, options = given.pop("yscale")
+            axes.set_yscale(scale, **options)
+        axes.set(**given)
         for axis, ticks in ((axes.xaxis, self.x_ticks), (axes.yaxis, self.y_ticks)):
             if ticks is not None:
                 axis.set_ticks(list(ticks), list(ticks.values()), fontsize=7 if self.small else None)

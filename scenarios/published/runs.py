@@ -2,7 +2,7 @@
 
 import enum
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, cast
 
 import numpy as np
@@ -48,7 +48,7 @@ class Runs:
         cls, table: CampaignTable, plan: CampaignPlan, keep: Callable[[Row], bool], free: Sequence[str] = ()
     ) -> "Runs":
         """Return the runs to keep; points are told apart by all parameters that the plan varies but the free ones."""
-        starts = {v.name: _plain(v.start) for v in plan.kind.parameters()}
+        starts = {v.name: plain(v.start) for v in plan.kind.parameters()}
         names = dict.fromkeys(name for point in plan.points for name in point if name not in free)
         return cls(filter(keep, table.rows), {name: starts.get(name) for name in names})
 
@@ -68,7 +68,7 @@ class Runs:
         return found
 
     def _key(self, given: Row) -> tuple[object, ...]:
-        values = ((_plain(given.get(name)), default) for name, default in self._defaults.items())
+        values = ((plain(given.get(name)), default) for name, default in self._defaults.items())
         return tuple(default if value is None else value for value, default in values)
 
     def of(self, *points: Point) -> "Runs":
@@ -78,9 +78,9 @@ class Runs:
 
     def matching(self, wanted: Point) -> "Runs":
         """Return the runs that have the given values, whatever their other parameters are."""
-        values = {name: _plain(text) for name, text in wanted.items()}
+        values = {name: plain(text) for name, text in wanted.items()}
         own = self._defaults
-        return self.where(lambda row: all(_or(_plain(row.get(n)), own.get(n)) == x for n, x in values.items()))
+        return self.where(lambda row: all(_or(plain(row.get(n)), own.get(n)) == x for n, x in values.items()))
 
     def where(self, keep: Callable[[Row], bool]) -> "Runs":
         """Return the runs to keep."""
@@ -120,16 +120,21 @@ def _or(value: object, default: object) -> object:
     return default if value is None else value
 
 
-def _plain(value: Any) -> object:
+def plain(value: Any) -> object:
     """Return a parameter's value, of a table, a text or a default, in one form; None if it is not set."""
     if value is None or (isinstance(value, (str, float)) and (value == "" or value != value)):
         return None
     if isinstance(value, enum.Enum):
         return value.name.lower()
     if isinstance(value, str):
-        if value in ("true", "false"):
-            return (float(value == "true"),)
-        parts = value.split(",")
-        return tuple(map(float, parts)) if all(map(is_number, parts)) else value
+        return _of_text(value)
     numbers: list[float] = np.atleast_1d(np.asarray(value, dtype=np.float64)).tolist()
     return cast(object, tuple(numbers))
+
+
+@lru_cache(maxsize=4096)
+def _of_text(text: str) -> object:
+    if text in ("true", "false"):
+        return (float(text == "true"),)
+    parts = text.split(",")
+    return tuple(map(float, parts)) if all(map(is_number, parts)) else text

@@ -1,33 +1,40 @@
 """Where infrared sensing wins and where it does not: ways to grasp along many axes, beyond Luberto et al."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from itertools import product
 from pathlib import Path
-from typing import ClassVar
+from textwrap import fill
+from typing import Any, ClassVar
 
 import numpy as np
 
-from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.statistics import LEVEL, success_interval, time_interval
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
+from handover.scenarios.experiment.plotting import COLOURS
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
-from handover.scenarios.published.ir_grasp.ir_limits_figures import draw_limits
-from handover.scenarios.published.ir_grasp.limits_axes import ARMS, AXES, PAPER, REFLEX, Axis, LimitArm, plan_of_limits
-from handover.scenarios.published.ir_grasp.limits_results import WORTH, LimitRuns, Row, sentence_of_worth
-from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment
-from handover.scenarios.published.verdicts import (
-    FEW,
-    format_interval,
-    format_p_value,
-    format_rate,
-    format_share,
-    min_trials_for,
-    nothing_measured,
-    verdict_of,
-    with_shortfall,
+from handover.scenarios.published.claims import Statement
+from handover.scenarios.published.figures import Drawable, Mark, Panel, drawn, level
+from handover.scenarios.published.ir_grasp.limits_axes import (
+    ARMS,
+    AXES,
+    CONTACT,
+    OF_SCENES,
+    PAPER,
+    REFLEX,
+    REPETITIONS,
+    SEED,
+    Axis,
+    LimitArm,
+    settings_of,
 )
+from handover.scenarios.published.ir_grasp.limits_results import WORTH, Comparison, LimitRuns, sentence_of_worth
+from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment
+from handover.scenarios.published.runs import Count, Point, Runs
+from handover.scenarios.published.tables import number, table_of, with_interval
+from handover.scenarios.published.verdicts import FEW, format_p_value, format_rate, format_share, min_trials_for
 
 _WITHOUT = tuple(arm for arm in ARMS if not arm.looks)
 _MIN_AXES = 4
@@ -35,10 +42,9 @@ _HELD, _MIN_RUNS = 0.95, 30
 _CARRIED, _HELD_CARRIED = 0.015, 0.90
 _PUSHED, _PUSHED_MOST = 0.005, 0.015
 _REFINED = 3.0
-_SPEED = next(axis for axis in AXES if axis.key == "speed")
-_LIGHT = tuple(axis for axis in AXES if axis.key in ("dark", "bright"))
+_AXIS = {axis.key: axis for axis in AXES}
 _ALIKE_AXES = sum(axis.blind_alike for axis in AXES)
-_CURVE = next(axis for axis in AXES if axis.key == "curve")
+_COLOURS = {arm.title: COLOURS[k] for k, arm in enumerate(ARMS)}
 
 
 class IrLimits(PublishedExperiment):
@@ -58,234 +64,236 @@ class IrLimits(PublishedExperiment):
 
     def plan(self, quick: bool) -> CampaignPlan:
         """Return arms x axes x levels x objects, three times; if quick, the hardest levels of one object, once."""
-        return plan_of_limits(self.name, quick)
+        points: dict[frozenset[tuple[str, str]], Point] = {}
+        for axis in AXES:
+            for x, arm in product(axis.levels[-1:] if quick else axis.all_levels, ARMS):
+                if arm.meets(axis):
+                    settings = settings_of(arm, axis, x)
+                    points |= {frozenset(point.items()): point for point in (settings[:1] if quick else settings)}
+        return self.campaign(
+            list(points.values()), repetitions=1 if quick else REPETITIONS, seed=SEED, paired=True, scenes=OF_SCENES
+        )
 
     def claims(self, table: CampaignTable) -> Sequence[Claim]:
         """Judge that one curve is enough, and what looking is worth."""
-        runs, unpushed = LimitRuns(table), LimitRuns(table, _PUSHED_MOST)
-        paper = [_one_curve(runs, PAPER), _alike(runs, PAPER)]
+        runs, unpushed = self.results(table), self.results(table, _PUSHED_MOST)
+        mild = [x for x in _AXIS["curve"].levels if x <= 0.1]
         return [
-            *paper,
+            _no_worse(
+                "One calibration curve is enough for all materials: with reflectivities from 0.2 to 2 the paper's "
+                "algorithm holds no fewer moved objects than with their own.", "satisfactory",
+                *runs.from_start(PAPER, [(_AXIS[key], _AXIS[key].levels) for key in ("dark", "bright")]),
+            ),
+            _no_worse(
+                "One curve is enough for all sensors: with constants off by 2 to 10 % at most the paper's algorithm "
+                "holds no fewer moved objects than with exact ones.", "they vary only slightly",
+                *runs.from_start(PAPER, [(_AXIS["curve"], mild)]),
+            ),
             _worth(runs),
             _worth(unpushed),
-            _holds(runs),
-            _carried(runs),
+            _rate_at_least(
+                f"The reflex holds {format_share(_HELD)} of all objects on these axes.", _of_all(runs, REFLEX).count,
+                _HELD,
+            ),
+            _rate_at_least(
+                f"Objects carried across at {1e3 * _CARRIED:.0f} mm/s are held in {format_share(_HELD_CARRIED)}.",
+                runs.count(REFLEX, _AXIS["speed"], (_CARRIED,)), _HELD_CARRIED,
+            ),
             _pushes(runs),
             _quick_enough(runs),
-        ]
+        ]  # fmt: skip
 
     def tables(self, table: CampaignTable) -> Sequence[ComparisonTable]:
         """Return what looking is worth, where each arm falls below one half, all rates, and what was pushed."""
-        runs, unpushed = LimitRuns(table), LimitRuns(table, _PUSHED_MOST)
-        return [_worth_table(runs), _worth_table(unpushed), _halves(runs), _rates(runs), _pushed_table(runs)]
+        runs, unpushed = self.results(table), self.results(table, _PUSHED_MOST)
+        levels = [
+            (axis, x) for axis in AXES for x in axis.all_levels if any(runs.count(a, axis, (x,))[1] for a in ARMS)
+        ]
+        pushed = {axis: {arm.title: _pushed(runs, arm, axis) for arm in ARMS} for axis in AXES}
+        return [
+            _table_of_worth(runs),
+            _table_of_worth(unpushed),
+            table_of(
+                "Where a way falls below one half",
+                [
+                    {"axis": axis.title, "range": _span(axis), **{arm.title: runs.half(arm, axis) for arm in ARMS}}
+                    for axis in _shown(runs)
+                ],
+                "Interpolated between levels. From the start: less than half is held without any disturbance, though "
+                "it may be more farther on, as where the object comes nearer.",
+            ),
+            table_of(
+                "Objects held",
+                [
+                    {
+                        "axis and level": f"{axis.title}: {axis.format_level(x)}",
+                        **{a.title: with_interval(runs.count(a, axis, (x,))).replace(" %)", ")") for a in ARMS},
+                    }
+                    for axis, x in levels
+                ],
+                "With 95 % intervals by Clopper and Pearson, in percent. Where it makes no difference to a hand that "
+                "does not look, its runs are those at the axis's start.",
+            ),
+            table_of(
+                "How far objects are pushed before the hand closes (mm): median, most",
+                [{"axis": axis.title, **cells} for axis, cells in pushed.items() if any(cells.values())],
+                "All levels beyond the start together; without what the ground carried an object.",
+            ),
+        ]
 
-    def draw(self, table: CampaignTable, runs: Path, folder: Path) -> Sequence[Figure]:  # noqa: ARG002 (its figures need the table alone)
+    def draw(self, table: CampaignTable, runs: Path, folder: Path) -> Sequence[Figure]:  # noqa: ARG002
         """Draw rates and displacement by level, a panel for each axis."""
-        return draw_limits(LimitRuns(table), folder)
+        found = self.results(table)
+        shown = _shown(found)
+        rows, columns = math.ceil(len(shown) / 4), min(len(shown), 4)
+        size = (11.0, 0.9 + 2.25 * rows)
+        return [
+            *drawn(folder / "limits", "Objects held by each way to grasp, the more disturbed the further to the right; "
+                   "intervals by Clopper and Pearson, 95 %. Leftmost there is no disturbance yet, but for the bars. In "
+                   f"all but the last {_ALIKE_AXES} objects start from the nominal pose.",
+                   [_panel(found, axis, "objects held (%)", ARMS, _rates, ylim=(-4, 104)) for axis in shown], columns,
+                   size=size, legend=4),
+            *drawn(folder / "limits_displacement", "How far objects are pushed before the hand closes, without what "
+                   "the ground carried: each run a point, medians as lines. The scale is linear up to 1 mm.",
+                   [_panel(found, axis, "pushed by (mm)", (REFLEX, PAPER, CONTACT), _displacements, ylim=(-0.1, 300))
+                    for axis in shown], columns, size=size, legend=4),
+        ]  # fmt: skip
+
+    def results(self, table: CampaignTable, pushed_most: float = math.inf) -> LimitRuns:
+        """Return the campaign's results, of which those count as held that were pushed by so much at most, m."""
+        return LimitRuns(self.runs(table, lambda _: True), pushed_most)
 
 
-def _one_curve(runs: LimitRuns, arm: LimitArm) -> Claim:
-    levels = [(axis, axis.levels) for axis in _LIGHT]
-    sentence = (
-        "One calibration curve is enough for all materials: with reflectivities from 0.2 to 2 the paper's algorithm "
-        "holds no fewer moved objects than with their own."
-    )
-    return _no_worse(sentence, "sec. V-B", "satisfactory", *runs.from_start(arm, levels))
+def _shown(runs: LimitRuns) -> list[Axis]:
+    return [axis for axis in AXES if any(runs.count(arm, axis, axis.all_levels)[1] for arm in ARMS)]
 
 
-def _alike(runs: LimitRuns, arm: LimitArm) -> Claim:
-    mild = [level for level in _CURVE.levels if level <= 0.1]
-    sentence = (
-        "One curve is enough for all sensors: with constants off by 2 to 10 % at most the paper's algorithm holds "
-        "no fewer moved objects than with exact ones."
-    )
-    return _no_worse(sentence, "sec. V-B", "they vary only slightly", *runs.from_start(arm, [(_CURVE, mild)]))
+def _of_all(runs: LimitRuns, arm: LimitArm) -> Runs:
+    """Return all runs of an arm, those that axes share once."""
+    points = (point for axis in AXES for x in axis.all_levels for point in settings_of(arm, axis, x))
+    return runs.all.of(*points)
 
 
-def _no_worse(sentence: str, where: str, printed: str, held: Sequence[float], started: Sequence[bool]) -> Claim:
+def _no_worse(sentence: str, printed: str, held: Sequence[float], started: Sequence[bool]) -> Claim:
     """Judge that no fewer are held at some levels than at the start; levels of a scene are not independent."""
-    if not held:
-        return nothing_measured(sentence, where, printed)
-    n, least = len(held), min_trials_for(FEW)
+    says, n = Statement(sentence, "sec. V-B", printed), len(held)
     lost = np.array(started, dtype=np.float64) - np.array(held)
-    interval = time_interval(lost, np.mean) if np.any(lost) else success_interval(0, n)
+    interval = time_interval(lost, np.mean) if np.any(lost) else success_interval(0, n) if n else None
     if interval is None:
-        return nothing_measured(sentence, where, printed)
-    reason = (
-        f"Reproduced if what is lost has an interval below {format_share(FEW)} of the scenes: of each, the share of "
-        f"levels that was not held, less 1 if it was not held undisturbed; the mean of {n} scenes is "
-        f"{format_share(float(lost.mean()))}, by {interval.method} over scenes up to {format_share(interval.high)}."
-    )
-    return Claim(
-        claim=sentence,
-        where=where,
-        published=printed,
-        measured=f"{format_share(float(np.mean(held)))} against {format_rate(sum(started), n)}",
-        verdict=verdict_of(interval.high < FEW, could_be_either=n >= least),
-        reason=with_shortfall(reason, n, least),
+        return says.unknown()
+    return says.judged(
+        f"{format_share(float(np.mean(held)))} against {format_rate(sum(started), n)}",
+        interval.high < FEW,
+        f"what is lost has an interval below {format_share(FEW)} of the scenes: of each, the share of levels that was "
+        "not held, less 1 if it was not held undisturbed",
+        f"The mean of {n} scenes is {format_share(float(lost.mean()))}, by {interval.method} over scenes up to "
+        f"{format_share(interval.high)}.",
+        runs=(n, min_trials_for(FEW)),
     )
 
 
 def _worth(runs: LimitRuns) -> Claim:
-    sentence = (
+    says = Statement(
         f"On at least {_MIN_AXES} axes the reflex holds {100 * WORTH:g} percentage points more of the objects than the "
         f"best way that does not look{_unpushed(runs)}."
     )
     compared = runs.compared(REFLEX, _WITHOUT)
     if not compared:
-        return nothing_measured(sentence, beyond=True)
-    worth = [c for c in compared if c.verdict == "worth it"]
-    return Claim(
-        claim=sentence,
-        published="",
-        measured=f"on {len(worth)} of {len(compared)}"
-        + "".join(f"; {c.axis.title} ({100 * c.gain:+.0f})" for c in sorted(worth, key=lambda c: -c.gain)),
-        verdict=verdict_of(len(worth) >= _MIN_AXES, could_be_either=all(c.first[1] >= _MIN_RUNS for c in compared)),
-        reason="Of each axis all levels beyond its start count, and the best of the others is that which held most of "
-        "them. An axis counts if the difference is as large and the exact sign-flip test over scenes, which is "
-        "McNemar's where a scene is met at one level, "
-        f"corrected by Holm over the axes, rejects at {format_share(LEVEL)}. It takes {_MIN_RUNS} runs of each.",
-        beyond=True,
+        return says.unknown()
+    worth = sorted((c for c in compared if c.verdict == "worth it"), key=lambda c: -c.gain)
+    return says.judged(
+        f"on {len(worth)} of {len(compared)}" + "".join(f"; {c.axis.title} ({100 * c.gain:+.0f})" for c in worth),
+        len(worth) >= _MIN_AXES,
+        "on so many axes the difference is as large, of all levels beyond the start, and the exact sign-flip test over "
+        f"scenes, corrected by Holm over the axes, rejects at {format_share(LEVEL)}",
+        f"The best of the others is that which held most. It takes {_MIN_RUNS} runs of each axis.",
+        enough=all(c.first[1] >= _MIN_RUNS for c in compared),
     )
 
 
-def _holds(runs: LimitRuns) -> Claim:
-    sentence = f"The reflex holds {format_share(_HELD)} of all objects on these axes."
-    rows = _once(runs, REFLEX)
-    return _rate_at_least(sentence, (sum(bool(row["success"]) for row in rows), len(rows)), _HELD)
-
-
-def _once(runs: LimitRuns, arm: LimitArm) -> list[Row]:
-    """Return all runs of an arm, those that axes share once."""
-    return list({row["run"]: row for axis in AXES for row in runs.rows(arm, axis, axis.all_levels)}.values())
-
-
-def _of_all(runs: LimitRuns, metric: str, arm: LimitArm) -> Floats:
-    """Return a metric of all runs of an arm, without those that have none."""
-    found = [row.get(metric) for row in _once(runs, arm)]
-    return np.array([v for v in found if v is not None and v == v], dtype=np.float64)
-
-
-def _carried(runs: LimitRuns) -> Claim:
-    sentence = f"Objects carried across at {1e3 * _CARRIED:.0f} mm/s are held in {format_share(_HELD_CARRIED)}."
-    return _rate_at_least(sentence, runs.count(REFLEX, _SPEED, (_CARRIED,)), _HELD_CARRIED)
-
-
-def _rate_at_least(sentence: str, count: tuple[int, int], rate: float) -> Claim:
-    k, n = count
+def _rate_at_least(sentence: str, count: Count, rate: float) -> Claim:
+    says, (k, n) = Statement(sentence), count
     if not n:
-        return nothing_measured(sentence, beyond=True)
-    interval, least = success_interval(k, n), min_trials_for(1.0 - rate)
-    return Claim(
-        claim=sentence,
-        published="",
-        measured=format_rate(k, n),
-        interval=(interval.low, interval.high),
-        verdict=verdict_of(k / n >= rate, could_be_either=n >= _MIN_RUNS),
-        reason=f"Holds if the rate is at least so high, of {_MIN_RUNS} runs or more. The interval is Clopper and "
-        f"Pearson's, all runs taken for independent; that all of it lies above takes {least} without a failure.",
-        beyond=True,
+        return says.unknown()
+    return says.judged(
+        format_rate(k, n),
+        k / n >= rate,
+        f"the rate is at least so high, of {_MIN_RUNS} runs or more",
+        "The interval is Clopper and Pearson's, all runs taken for independent; that all of it lies above takes "
+        f"{min_trials_for(1.0 - rate)} without a failure.",
+        enough=n >= _MIN_RUNS,
+        interval=success_interval(k, n),
     )
 
 
 def _pushes(runs: LimitRuns) -> Claim:
-    sentence = (
-        f"Before it closes the reflex pushes an object by {1e3 * _PUSHED:.0f} mm in the median, and by "
-        f"{1e3 * _PUSHED_MOST:.0f} mm at most."
+    most = f"{1e3 * _PUSHED_MOST:.0f} mm"
+    says = Statement(
+        f"Before it closes the reflex pushes an object by {1e3 * _PUSHED:.0f} mm in the median, and by {most} at most."
     )
-    pushed = _of_all(runs, "displacement", REFLEX)
+    pushed = _of_all(runs, REFLEX).metric("displacement")
     if not len(pushed):
-        return nothing_measured(sentence, beyond=True)
-    median, most = float(np.median(pushed)), float(pushed.max())
-    over = int(np.sum(pushed > _PUSHED_MOST))
-    return Claim(
-        claim=sentence,
-        published="",
-        measured=f"{1e3 * median:.1f} mm and {1e3 * most:.0f} mm; over {1e3 * _PUSHED_MOST:.0f} mm in "
-        f"{format_rate(over, len(pushed))}",
-        verdict=verdict_of(median <= _PUSHED and most <= _PUSHED_MOST, could_be_either=len(pushed) >= _MIN_RUNS),
-        reason="Holds if both are so over all its runs on these axes; without what the ground carried.",
-        beyond=True,
+        return says.unknown()
+    over = format_rate(int(np.sum(pushed > _PUSHED_MOST)), len(pushed))
+    return says.judged(
+        f"{1e3 * np.median(pushed):.1f} mm and {1e3 * pushed.max():.0f} mm; over {most} in {over}",
+        bool(np.median(pushed) <= _PUSHED and pushed.max() <= _PUSHED_MOST),
+        "both are so over all its runs on these axes; without what the ground carried",
+        enough=len(pushed) >= _MIN_RUNS,
     )
 
 
 def _quick_enough(runs: LimitRuns) -> Claim:
-    sentence = f"The reflex refines a grasp in {_REFINED:g} s in the median."
-    times = {arm.title: _of_all(runs, "refinement_time", arm) for arm in (REFLEX, PAPER)}
+    says = Statement(f"The reflex refines a grasp in {_REFINED:g} s in the median.")
+    times = {arm.title: _of_all(runs, arm).metric("refinement_time") for arm in (REFLEX, PAPER)}
     ours = times[REFLEX.title]
     if not len(ours):
-        return nothing_measured(sentence, beyond=True)
-    medians = ", ".join(f"{title} {np.median(t):.1f} s" for title, t in times.items() if len(t))
-    return Claim(
-        claim=sentence,
-        published="",
-        measured=medians,
-        verdict=verdict_of(float(np.median(ours)) <= _REFINED, could_be_either=len(ours) >= _MIN_RUNS),
-        reason="Holds if it is so over all its runs on these axes; the paper's algorithm runs on "
-        f"{len(PAPER.axes)} of them.",
-        beyond=True,
+        return says.unknown()
+    return says.judged(
+        ", ".join(f"{title} {np.median(t):.1f} s" for title, t in times.items() if len(t)),
+        bool(np.median(ours) <= _REFINED),
+        "it is so over all its runs on these axes",
+        f"The paper's algorithm runs on {len(PAPER.axes)} of them.",
+        enough=len(ours) >= _MIN_RUNS,
     )
 
 
-def _worth_table(runs: LimitRuns) -> ComparisonTable:
+def _table_of_worth(runs: LimitRuns) -> ComparisonTable:
     compared = runs.compared(REFLEX, _WITHOUT)
-    rows = [
-        [
-            c.axis.title,
-            f"{c.first[0]}/{c.first[1]}" if c.axis.blind_alike else _with_interval(c.first),
-            c.best.title,
-            _with_interval(c.second),
-            f"{100 * c.gain:+.0f}",
-            f"{c.only_first}, {c.only_second}",
-            format_p_value(c.p),
-            c.verdict,
-        ]
-        for c in compared
-    ]
-    of_scenes = "scenes: it held more, the other"
-    header = ["axis", "reflex", "best without looking", "it holds", "points", of_scenes, "p", "looking"]
-    why = _WHY_UNPUSHED if _unpushed(runs) else ""
+    why = (
+        f"Held, and pushed by at most {1e3 * _PUSHED_MOST:.0f} mm before the hand closed: what slides on this table "
+        "may be knocked over on another. "
+        if _unpushed(runs)
+        else ""
+    )
     note = (
         f"{why}{sentence_of_worth(compared)} All levels beyond the start together, in the same scenes; p by the exact "
-        "sign-flip test over scenes, corrected by Holm over the axes. "
-        f"On the last {_ALIKE_AXES} axes the levels are of the same scenes, and a hand that does not look met each "
-        "once. The best way without looking is chosen by these runs themselves, which favours it."
+        f"sign-flip test over scenes, corrected by Holm over the axes. On the last {_ALIKE_AXES} axes the levels are "
+        "of the same scenes, and a hand that does not look met each once. The best way without looking is chosen by "
+        "these runs themselves, which favours it."
     )
     if runs.unfinished:
         note += f" {runs.unfinished} runs did not come to their end, and count as failures."
-    return ComparisonTable(title=f"What looking is worth{_unpushed(runs)}", header=header, rows=rows, note=note)
+    return table_of(f"What looking is worth{_unpushed(runs)}", [_row_of_worth(c) for c in compared], note)
 
 
-_WHY_UNPUSHED = (
-    f"Held, and pushed by at most {1e3 * _PUSHED_MOST:.0f} mm before the hand closed: what slides on this table may be "
-    "knocked over on another. "
-)
+def _row_of_worth(c: Comparison) -> dict[str, str]:
+    return {
+        "axis": c.axis.title,
+        "reflex": f"{c.first[0]}/{c.first[1]}" if c.axis.blind_alike else with_interval(c.first),
+        "best without looking": c.best.title,
+        "it holds": with_interval(c.second),
+        "points": f"{100 * c.gain:+.0f}",
+        "scenes: it held more, the other": f"{c.only_first}, {c.only_second}",
+        "p": format_p_value(c.p),
+        "looking": c.verdict,
+    }
 
 
 def _unpushed(runs: LimitRuns) -> str:
     """Return words for what counts as held."""
-    return (
-        "" if runs.pushed_most == math.inf else f", counting what was pushed by at most {1e3 * runs.pushed_most:.0f} mm"
-    )
-
-
-def _with_interval(count: tuple[int, int]) -> str:
-    if not count[1]:
-        return ""
-    interval = success_interval(*count)
-    return f"{count[0]}/{count[1]} ({format_interval(interval.low, interval.high)})"
-
-
-def _halves(runs: LimitRuns) -> ComparisonTable:
-    shown = [axis for axis in AXES if any(runs.count(arm, axis, axis.all_levels)[1] for arm in ARMS)]
-    rows = [[axis.title, _span(axis), *(runs.half(arm, axis) for arm in ARMS)] for axis in shown]
-    return ComparisonTable(
-        title="Where a way falls below one half",
-        header=["axis", "range", *(arm.title for arm in ARMS)],
-        rows=rows,
-        note="Interpolated between levels. From the start: less than half is held without any disturbance, though "
-        "it may be more farther on, as where the object comes nearer.",
-    )
+    most = f", counting what was pushed by at most {1e3 * runs.pushed_most:.0f} mm"
+    return "" if runs.pushed_most == math.inf else most
 
 
 def _span(axis: Axis) -> str:
@@ -293,37 +301,53 @@ def _span(axis: Axis) -> str:
     return f"{axis.format_number(first)} to {axis.format_level(last)}"
 
 
-def _rates(runs: LimitRuns) -> ComparisonTable:
-    rows: list[list[str]] = []
-    for axis in AXES:
-        for level in axis.all_levels:
-            counts = [runs.count(arm, axis, (level,)) for arm in ARMS]
-            if any(n for _, n in counts):
-                cells = [_with_interval(count).replace(" %)", ")") for count in counts]
-                rows.append([f"{axis.title}: {axis.format_level(level)}", *cells])
-    return ComparisonTable(
-        title="Objects held",
-        header=["axis and level", *(arm.title for arm in ARMS)],
-        rows=rows,
-        note="With 95 % intervals by Clopper and Pearson, in percent. Where it makes no difference to a hand that does "
-        "not look, its runs are those at the axis's start.",
-    )
-
-
-def _pushed_table(runs: LimitRuns) -> ComparisonTable:
-    rows: list[list[str]] = []
-    for axis in AXES:
-        cells = [_pushed(runs, arm, axis) for arm in ARMS]
-        if any(cells):
-            rows.append([axis.title, *cells])
-    return ComparisonTable(
-        title="How far objects are pushed before the hand closes (mm): median, most",
-        header=["axis", *(arm.title for arm in ARMS)],
-        rows=rows,
-        note="All levels beyond the start together; without what the ground carried an object.",
-    )
-
-
 def _pushed(runs: LimitRuns, arm: LimitArm, axis: Axis) -> str:
-    pushed = 1e3 * runs.values("displacement", arm, axis, axis.levels)
-    return f"{np.median(pushed):.1f}, {pushed.max():.0f}" if len(pushed) else ""
+    pushed = 1e3 * runs.of(arm, axis, axis.levels).metric("displacement")
+    return f"{number(pushed)}, {pushed.max():.0f}" if len(pushed) else ""
+
+
+Draw = Callable[[LimitRuns, LimitArm, Axis, int, int], Sequence[Drawable]]
+"""Returns marks of an arm along an axis; which of how many arms it is."""
+
+
+def _panel(
+    runs: LimitRuns, axis: Axis, label: str, arms: Sequence[LimitArm], draw: Draw, ylim: tuple[float, float]
+) -> Panel:
+    marks = [mark for k, arm in reversed(list(enumerate(arms))) for mark in draw(runs, arm, axis, k, len(arms))]
+    key = [
+        Mark(form="o-" if arm.looks else "o--", colour=_COLOURS[arm.title], label=arm.title, style={"ms": 3})
+        for arm in arms
+    ]
+    ticks = {float(k): axis.format_number(x) for k, x in enumerate(axis.all_levels)}
+    title = f"{axis.title} ({axis.unit})" if axis.unit else axis.title
+    axes: dict[str, Any] = {"xlabel": fill(title, 34), "ylabel": label, "xlim": (-0.4, len(ticks) - 0.6)}
+    if draw is _displacements:
+        ten = {0.0: "0", 1.0: "1", 10.0: "10", 100.0: "100"}
+        return Panel([*marks, *key], {**axes, "yscale": ("symlog", {"linthresh": 1.0}), "ylim": ylim}, ticks, ten,
+                     small=True)  # fmt: skip
+    return Panel([level(50.0, lw=0.7), *marks, *key], {**axes, "ylim": ylim}, ticks, small=True)
+
+
+def _rates(runs: LimitRuns, arm: LimitArm, axis: Axis, k: int, n: int) -> Sequence[Drawable]:
+    counts = [(place + 0.05 * (k - 0.5 * (n - 1)), runs.count(arm, axis, (x,)))
+              for place, x in enumerate(axis.all_levels)]  # fmt: skip
+    counts = [(place, count) for place, count in counts if count[1]]
+    rates = np.array([100 * held / tried for _, (held, tried) in counts])
+    intervals = [success_interval(*count) for _, count in counts]
+    bars = [rates - [100 * i.low for i in intervals], [100 * i.high for i in intervals] - rates]
+    style = {"ms": 3, "lw": 1.4 if arm.looks else 1.0}
+    form, places = "o-" if arm.looks else "o--", [place for place, _ in counts]
+    return [Mark(places, rates, form, _COLOURS[arm.title], bars=bars, style=style)] if counts else []
+
+
+def _displacements(runs: LimitRuns, arm: LimitArm, axis: Axis, k: int, _n: int) -> Sequence[Drawable]:
+    marks: list[Mark] = []
+    medians: list[tuple[float, float]] = []
+    colour = _COLOURS[arm.title]
+    for place, x in enumerate(axis.all_levels):
+        pushed = 1e3 * runs.of(arm, axis, (x,)).metric("displacement")
+        if len(pushed):
+            at = place + 0.14 * (k - 1)
+            marks.append(Mark(np.full(len(pushed), at), pushed, ".", colour, style={"ms": 2.5, "alpha": 0.5}))
+            medians.append((at, float(np.median(pushed))))
+    return [*marks, Mark.through(medians, "-", colour)] if medians else []

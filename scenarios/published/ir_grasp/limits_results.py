@@ -1,66 +1,23 @@
 """Results of `ir-limits`: counts by arm, axis and level, paired tests, and what follows from them by rule."""
 
-import enum
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from typing import Any, cast
 
 import numpy as np
 
-from handover.controllers.ir_grasp.parameters import Params as ReflexParams
-from handover.cosim.blocks.ports import Floats
-from handover.plants.ir_grasp.parameters import Params as SceneParams
 from handover.scenarios.campaign.statistics import LEVEL, holm, sign_flip_test
-from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.ir_grasp.parameters import Parameters
-from handover.scenarios.published.ir_grasp.limits_axes import AXES, PARAMETERS, Axis, LimitArm, Point, settings_of
+from handover.scenarios.published.ir_grasp.limits_axes import AXES, Axis, LimitArm, settings_of
+from handover.scenarios.published.runs import Count, Row, Runs, is_done, plain
 
 WORTH = 0.15
 """Difference of rates from which on sensing counts as worth something, or as costing something."""
 
 _HALF = 0.5
 
-Row = Mapping[str, Any]
 Scene = tuple[object, ...]
-Count = tuple[int, int]
-"""Successes and trials."""
-
-_DEFAULTS = {"": Parameters(), "scene": SceneParams(), "reflex": ReflexParams()}
-
-
-_BOOLEANS = {"true": 1.0, "false": 0.0}
 Levels = Sequence[tuple[Axis, Sequence[float]]]
 """Levels of some axes."""
-
-
-def _is_unset(value: Any) -> bool:
-    return value is None or value == "" or (isinstance(value, float) and value != value)
-
-
-@lru_cache(maxsize=4096)
-def _canonical(name: str, value: Any) -> object:
-    """Return a parameter's value, a text of a point or of a column, in one form; None stands for the default."""
-    unit, _, parameter = name.rpartition(".")
-    value = getattr(_DEFAULTS[unit], parameter, None) if _is_unset(value) else value
-    if isinstance(value, enum.Enum):
-        return value.name.lower()
-    if isinstance(value, str):
-        try:
-            value = [_BOOLEANS[x] if x in _BOOLEANS else float(x) for x in value.split(",")]
-        except ValueError:
-            return value
-    return tuple(np.round(np.atleast_1d(np.asarray(value, dtype=np.float64)), 9).tolist())
-
-
-def _key(values: Point | Row) -> tuple[object, ...]:
-    return tuple(_of(values, name) for name in PARAMETERS)
-
-
-def _of(values: Point | Row, name: str) -> object:
-    value: Any = values.get(name)
-    return _canonical(name, tuple(cast(list[float], value)) if isinstance(value, list) else value)
 
 
 @dataclass(frozen=True)
@@ -105,26 +62,22 @@ class LimitRuns:
     """The rows of a campaign's table by what they are of; a run that did not come to its end has failed.
 
     Args:
-        table: of the campaign.
+        runs: of the campaign.
         pushed_most: how far an object may have been pushed before the hand closes to count as held, m.
     """
 
-    def __init__(self, table: CampaignTable, pushed_most: float = math.inf) -> None:
-        self.pushed_most = pushed_most
-        self._rows: dict[tuple[object, ...], list[Row]] = {}
-        for row in table.rows:
-            self._rows.setdefault(_key(row), []).append(row)
-        self.unfinished = sum(row["status"] != "done" for row in table.rows)
+    def __init__(self, runs: Runs, pushed_most: float = math.inf) -> None:
+        self.all, self.pushed_most = runs, pushed_most
+        self.unfinished = sum(not is_done(row) for row in runs)
 
-    def rows(self, arm: LimitArm, axis: Axis, levels: Sequence[float]) -> list[Row]:
+    def of(self, arm: LimitArm, axis: Axis, levels: Sequence[float]) -> Runs:
         """Return the runs of an arm at levels of an axis, each once, of however many levels it is."""
-        points = [p for level in levels for p in settings_of(arm, axis, level)]
-        return list({row["run"]: row for p in points for row in self._rows.get(_key(p), ())}.values())
+        return self.all.of(*(point for level in levels for point in settings_of(arm, axis, level)))
 
     def count(self, arm: LimitArm, axis: Axis, levels: Sequence[float]) -> Count:
         """Return successes and trials."""
-        rows = self.rows(arm, axis, levels)
-        return sum(self._held(row) for row in rows), len(rows)
+        runs = self.of(arm, axis, levels)
+        return sum(map(self._held, runs)), len(runs)
 
     def differences(self, first: LimitArm, second: LimitArm, axis: Axis) -> list[int]:
         """Return, by scene, how many levels beyond the start the first arm held more than the second."""
@@ -152,20 +105,15 @@ class LimitRuns:
     def _by_scene(self, arm: LimitArm, axis: Axis, level: float) -> dict[Scene, bool]:
         """Return successes at a level by scene: object and seed."""
         return {
-            (*(_of(row, name) for name in ("thing", "thing_seed", "scene.mass_O")), row["seed"]): self._held(row)
-            for row in self.rows(arm, axis, (level,))
+            (*(plain(row.get(name)) for name in ("thing", "thing_seed", "scene.mass_O")), row["seed"]): self._held(row)
+            for row in self.of(arm, axis, (level,))
         }
 
     def _held(self, row: Row) -> bool:
-        if row["status"] != "done" or not row["success"]:
+        if not is_done(row) or not row["success"]:
             return False
         pushed = row.get("displacement")
         return self.pushed_most == math.inf or (pushed is not None and pushed <= self.pushed_most)
-
-    def values(self, metric: str, arm: LimitArm, axis: Axis, levels: Sequence[float]) -> Floats:
-        """Return a metric of runs, without those that have none."""
-        found = [row.get(metric) for row in self.rows(arm, axis, levels)]
-        return np.array([v for v in found if v is not None and v == v], dtype=np.float64)
 
     def half(self, arm: LimitArm, axis: Axis) -> str:
         """Return where an arm's rate first is below one half along an axis, interpolated between levels.

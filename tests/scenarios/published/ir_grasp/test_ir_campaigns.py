@@ -17,16 +17,18 @@ from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.plan_check import prepared
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.ir_grasp.ir_sensor import Finger
-from handover.scenarios.published.ir_grasp.convergence_curves import descents_of
-from handover.scenarios.published.ir_grasp.ir_convergence import IrConvergence
+from handover.scenarios.published.ir_grasp.ir_convergence import IrConvergence, descents_of
 from handover.scenarios.published.ir_grasp.ir_limits import IrLimits
-from handover.scenarios.published.ir_grasp.ir_sensor import IrSensorCurve
-from handover.scenarios.published.ir_grasp.ir_sensor_cases import Case, SensorRuns, readings_of_rows
-from handover.scenarios.published.ir_grasp.ir_table import IrTable
-from handover.scenarios.published.ir_grasp.ir_table_runs import ARMS, BLIND, FORWARD_55, REFLEX, IrTableRuns
+from handover.scenarios.published.ir_grasp.ir_sensor import (
+    IrSensorCurve,
+    case,
+    fits_of,
+    readings_of_rows,
+    sensor_runs,
+)
+from handover.scenarios.published.ir_grasp.ir_table import ARMS, BLIND, FORWARD_55, REFLEX, IrTable, IrTableRuns
 from handover.scenarios.published.ir_grasp.limits_axes import ARMS as LIMIT_ARMS
 from handover.scenarios.published.ir_grasp.limits_axes import AXES
-from handover.scenarios.published.ir_grasp.limits_results import LimitRuns
 from handover.scenarios.published.published_experiment import (
     PaperResults,
     PublishedExperiment,
@@ -49,11 +51,11 @@ def run(
 
 def test_a_sensors_fit_is_the_curve_that_the_controller_has(tmp_path: Path, sketches: Sketches):
     folder, table = run(IrSensorCurve(), tmp_path / "c", {"finger": "ring", "scene.sensor_tolerance": "0"})
-    runs = SensorRuns(table)
-    (fit,) = runs.fits(Case(Finger.RING))
+    runs = sensor_runs(table)
+    (fit,) = fits_of(runs.of(*case(Finger.RING)))
     assert (fit.a, fit.b, fit.c, fit.d) == pytest.approx((0.062, -0.003, 0.022, -0.00043), rel=0.05)
     assert fit.residual < 4e-4
-    distance, ticks = readings_of_rows(runs.rows(Case(Finger.RING, 0.5)), folder.runs)
+    distance, ticks = readings_of_rows(runs.of(*case(Finger.RING, reflectivity=0.5)).rows, folder.runs)
     assert ticks[np.argmin(np.abs(distance - 0.010))] == pytest.approx(1850 / 2, rel=0.03)
     draw_figures(IrSensorCurve(), table, folder.runs, folder.figures)
     assert set(sketches) == {"characteristic", "one_curve", "time_of_flight"}
@@ -62,8 +64,8 @@ def test_a_sensors_fit_is_the_curve_that_the_controller_has(tmp_path: Path, sket
 
 def test_descents_begin_at_the_first_step_and_end_where_the_hand_closed(tmp_path: Path, sketches: Sketches):
     folder, table = run(IrConvergence(), tmp_path / "c", {"thing": "baby_cup_a", "perturbed": "true"})
-    rows = IrTableRuns(table).rows(REFLEX, True)
-    (descent,), (row,) = descents_of(rows, folder.runs), rows
+    runs = IrTableRuns(table).of(REFLEX, True)
+    (descent,), (row,) = descents_of(runs, folder.runs), runs
     assert len(descent.norm) == row["steps"] + 1
     assert descent.ends is not None
     assert descent.ends[1] < descent.ends[0]
@@ -76,7 +78,7 @@ def test_descents_begin_at_the_first_step_and_end_where_the_hand_closed(tmp_path
 
 def test_runs_of_the_limits_are_found_by_what_they_are_of(tmp_path: Path, sketches: Sketches):
     folder, table = run(IrLimits(), tmp_path / "c", {"thing": "disc", "disc_radius": "0.055", "strategy": "contact"})
-    runs = LimitRuns(table)
+    runs = IrLimits().results(table)
     large = next(axis for axis in AXES if axis.key == "large")
     tried = [int(arm.meets(large) and arm.parameters["strategy"] == "contact") for arm in LIMIT_ARMS]
     assert sum(tried) > 1
@@ -93,7 +95,7 @@ def test_a_moved_cylinder_grasped_once_in_each_way_has_its_cells_and_files(tmp_p
     assert [runs.count(arm, True, Thing.CYLINDER)[1] for arm in ARMS] == [1, 1, 1, 1]
     assert (runs.count(REFLEX, False), runs.count(BLIND, True)) == ((0, 0), (0, 1))
     assert runs.pairs((REFLEX, True), (FORWARD_55, True)) == ([True], [True])
-    (thumb,) = runs.metric("final_distance_thumb", REFLEX, True, (Thing.CYLINDER,))
+    (thumb,) = runs.distance("thumb", True, "cylinder")
     assert thumb == pytest.approx(0.010, abs=0.004)  # the target, and what the threshold of the cost allows
     why = {row[0]: row[1] for row in IrTable().tables(table)[3].rows}
     wanted = {"blind": "1 blind", "forward 35 mm": "1 forward", "IR-guided": "1 threshold"}

@@ -5,9 +5,8 @@ import pytest
 
 from handover.controllers.ir_grasp.visibility import Visibility
 from handover.cosim.blocks.ports import Floats
-from handover.scenarios.published.ir_grasp.convergence_curves import Descent, median_of
 from handover.scenarios.published.ir_grasp.grasp_drawings import SEEN
-from handover.scenarios.published.ir_grasp.ir_convergence import IrConvergence, judge_descents
+from handover.scenarios.published.ir_grasp.ir_convergence import Descent, IrConvergence, judge_descents, median_of
 from handover.scenarios.published.published_experiment import Verdict
 
 NAN = float("nan")

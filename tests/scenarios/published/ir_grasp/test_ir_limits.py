@@ -70,7 +70,7 @@ def succeeds(run: PlannedRun) -> bool:
 
 @pytest.fixture(scope="module")
 def runs() -> LimitRuns:
-    return LimitRuns(limits_table(succeeds))
+    return IrLimits().results(limits_table(succeeds))
 
 
 @pytest.fixture(scope="module")
@@ -106,7 +106,7 @@ def test_objects_that_are_held_out_are_drawn_alone():
 
 
 def test_every_arm_has_runs_at_every_level_of_its_axes_and_in_the_quick_plan_at_the_hardest(runs: LimitRuns):
-    quick = LimitRuns(limits_table(succeeds, quick=True))
+    quick = IrLimits().results(limits_table(succeeds, quick=True))
     for along in AXES:
         for arm in (arm for arm in ARMS if arm.meets(along)):
             assert {runs.count(arm, along, (level,))[1] for level in along.all_levels} == {3 * len(along.scenes)}
@@ -118,8 +118,8 @@ def test_every_arm_has_runs_at_every_level_of_its_axes_and_in_the_quick_plan_at_
 
 def test_light_makes_no_difference_to_hands_that_do_not_look(runs: LimitRuns):
     dark = axis("dark")
-    assert runs.rows(CONTACT, dark, dark.levels[:1]) == runs.rows(CONTACT, dark, dark.all_levels[:1])
-    assert runs.rows(PAPER, dark, dark.levels[:1]) != runs.rows(PAPER, dark, dark.all_levels[:1])
+    assert runs.of(CONTACT, dark, dark.levels[:1]).rows == runs.of(CONTACT, dark, dark.all_levels[:1]).rows
+    assert runs.of(PAPER, dark, dark.levels[:1]).rows != runs.of(PAPER, dark, dark.all_levels[:1]).rows
 
 
 def test_an_arm_falls_below_one_half_between_levels_and_the_best_way_is_that_which_held_most(runs: LimitRuns):
@@ -131,7 +131,7 @@ def test_an_arm_falls_below_one_half_between_levels_and_the_best_way_is_that_whi
         contact = run.parameters["strategy"] == "contact" and "reflex.touch_torque" not in run.parameters
         return contact and run.repetition == 0
 
-    few = LimitRuns(limits_table(held))
+    few = IrLimits().results(limits_table(held))
     assert few.half(BLIND, axis("towards")) == "from the start"
     assert few.half(BLIND, axis("away")) == ""  # not tried
     assert few.half(CONTACT, axis("bar")) == "at 60 mm or before"
@@ -148,7 +148,7 @@ def test_looking_is_worth_it_where_pairs_differ_by_enough_and_costs_where_they_d
     assert (worth["towards"].only_first, worth["towards"].only_second) == (60, 0)
     assert worth["towards"].p == pytest.approx(len(worth) * 2.0**-59, rel=1e-6)  # as McNemar's of 60 pairs, by Holm
     assert worth["turn"].verdict == "no difference shown"
-    worse = LimitRuns(limits_table(lambda run: run.parameters["strategy"] == "forward"))
+    worse = IrLimits().results(limits_table(lambda run: run.parameters["strategy"] == "forward"))
     found = worse.compared(REFLEX, (FORWARD_35, FORWARD_55))
     assert {c.verdict for c in found} == {"costs"}
     for axes in (compared, found, []):
@@ -164,7 +164,7 @@ def test_levels_of_one_scene_are_not_taken_for_independent():
         fails = p["thing"] == "cylinder" and p["perturbed"] == "true" and "shift_least" not in p
         return p["strategy"] == "reflex" or not fails
 
-    found = LimitRuns(limits_table(held))
+    found = IrLimits().results(limits_table(held))
     (compared,) = (c for c in found.compared(REFLEX, WITHOUT) if c.axis is curve)
     assert compared.first == (6 * 36, 6 * 36)
     assert compared.second == (33, 36)  # each run once
@@ -210,7 +210,7 @@ def test_a_hand_that_pushes_what_it_takes_is_outdone_where_that_counts(
         lambda _run: True, pushed=lambda run: by_reflex if run.parameters["strategy"] == "reflex" else by_others
     )
     assert [v is Verdict.REPRODUCED for v in verdicts(IrLimits().claims(pushing))] == expected
-    runs = LimitRuns(pushing, pushed_most=0.015)
+    runs = IrLimits().results(pushing, pushed_most=0.015)
     for arm, push in ((REFLEX, by_reflex), (CONTACT, by_others)):
         assert runs.count(arm, axis("away"), axis("away").levels) == (60 if push < 0.015 else 0, 60)
 

@@ -7,9 +7,14 @@ from support.scenarios.made_tables import empty, made_table, one
 
 from handover.scenarios.campaign.plan import PlannedRun
 from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.ir_grasp.ir_sensor import AT
-from handover.scenarios.published.ir_grasp.ir_sensor import IrSensorCurve
-from handover.scenarios.published.ir_grasp.ir_sensor_cases import REFLECTIVITIES, TOLERANCES, Case, SensorRuns
+from handover.scenarios.ir_grasp.ir_sensor import AT, Finger
+from handover.scenarios.published.ir_grasp.ir_sensor import (
+    REFLECTIVITIES,
+    TOLERANCES,
+    IrSensorCurve,
+    case,
+    sensor_runs,
+)
 from handover.scenarios.published.published_experiment import Verdict
 
 
@@ -27,10 +32,10 @@ def sensor_table(**metrics: Callable[[PlannedRun], float | None]) -> CampaignTab
 
 
 def test_the_whole_plan_has_every_sensor_material_and_tolerance():
-    runs = SensorRuns(sensor_table())
-    assert all(len(runs.rows(Case(reflectivity=rho))) == 9 for rho in REFLECTIVITIES)
-    assert all(len(runs.rows(Case(tolerance=t))) == 9 for t in TOLERANCES)
-    assert len(runs.rows(Case(incidence=0.4))) == 3
+    runs = sensor_runs(sensor_table())
+    assert all(len(runs.of(*case(reflectivity=rho))) == 9 for rho in REFLECTIVITIES)
+    assert all(len(runs.of(*case(tolerance=t))) == 9 for t in TOLERANCES)
+    assert len(runs.of(*case(Finger.RING, incidence=0.4))) == 3
 
 
 def test_what_follows_from_the_scenes_own_assumptions_is_told_of_the_worst_and_has_no_verdict():

@@ -16,9 +16,7 @@ from support.wording import Wording
 from handover.plants.ir_grasp.objects import Thing
 from handover.scenarios.campaign.plan import PlannedRun
 from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.published.ir_grasp.ir_table import IrTable
-from handover.scenarios.published.ir_grasp.ir_table_claims import closing_claims, distance_claims, rate_claims
-from handover.scenarios.published.ir_grasp.ir_table_runs import BLIND, FORWARD_35, REFLEX, IrTableRuns
+from handover.scenarios.published.ir_grasp.ir_table import BLIND, FORWARD_35, REFLEX, IrTable, IrTableRuns
 from handover.scenarios.published.published_experiment import Claim, Verdict
 
 TUNED = range(1000, 1008)
@@ -133,7 +131,7 @@ def test_other_rates_distances_and_touches_have_other_verdicts():
     def spread(run: PlannedRun) -> float:
         return 0.010 + 0.001 * run.repetition
 
-    runs = IrTableRuns(
+    claims = IrTable().claims(
         grasp_table(
             lambda run: succeeds(run) and run.repetition % 4 != 0,
             final_distance_thumb=spread,
@@ -142,12 +140,12 @@ def test_other_rates_distances_and_touches_have_other_verdicts():
             displacement=lambda run: 0.002 if run.repetition < 2 else 0.0,
         )
     )
-    best = one(rate_claims(runs), BEST)
+    best = one(claims, BEST)
     assert (best.measured, best.verdict) == ("60/80 (75 %)", Verdict.REPRODUCED)
     begin = "In perturbed poses thumb and ring end 13 to 19 mm"
-    assert one(distance_claims(runs), begin).verdict is Verdict.REPRODUCED
-    assert one(closing_claims(runs), TOUCH).verdict is Verdict.NOT_REPRODUCED
-    fewer = one(rate_claims(IrTableRuns(grasp_table(lambda run: run.repetition < 4))), BEST)
+    assert one(claims, begin).verdict is Verdict.REPRODUCED
+    assert one(claims, TOUCH).verdict is Verdict.NOT_REPRODUCED
+    fewer = one(IrTable().claims(grasp_table(lambda run: run.repetition < 4)), BEST)
     assert "easier task" not in fewer.reason
 
 
