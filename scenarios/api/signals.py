@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
+from handover.scenarios.experiment.display_unit import counted
 from handover.scenarios.results.run_facts import elements_of
 
 if TYPE_CHECKING:
@@ -76,7 +77,7 @@ class SignalTable(Mapping[str, NDArray[Any]]):
     def __repr__(self) -> str:
         """Return how many there are, and over which time."""
         duration = self.time[-1] - self.time[0] if len(self.time) else 0.0
-        return f"<{len(self)} signal{'' if len(self) == 1 else 's'} over {duration:g} s, {len(self.time)} rows>"
+        return f"<{counted(len(self), 'signal')} over {duration:g} s, {len(self.time)} rows>"
 
 
 def data_frame(columns: Mapping[str, Any], units: Mapping[str, str]) -> "DataFrame":

@@ -20,7 +20,7 @@ from handover.scenarios.campaign_report.points import points_section, success_se
 from handover.scenarios.campaign_report.runs import failures_section, runs_section
 from handover.scenarios.campaign_report.settings import figures_section, setting_section
 from handover.scenarios.campaign_report.spread_section import spread_section
-from handover.scenarios.experiment.display_unit import display_unit
+from handover.scenarios.experiment.display_unit import counted, display_unit
 from handover.scenarios.published.catalog import EXPERIMENTS
 from handover.scenarios.published.published_experiment import (
     Claim,
@@ -60,7 +60,7 @@ def _scenario(results: CampaignResults) -> str:
 def _verdict(results: CampaignResults) -> Markup:
     ended, planned, status = len(results.table), results.planned, results.table.column("status")
     done, failed, lost = (int(np.count_nonzero(status == s)) for s in ("done", "failed", "lost"))
-    parts = [f"in {results.successes} of {done} runs done the task succeeded"]
+    parts = [f"in {results.successes} of {counted(done, 'run')} done the task succeeded"]
     parts += [f"{failed} failed to run"] if failed else []
     parts += [f"{lost} {'was' if lost == 1 else 'were'} lost"] if lost else []
     sentence = "; ".join(parts) + "."
@@ -68,8 +68,7 @@ def _verdict(results: CampaignResults) -> Markup:
         so_far = Markup("<b>{} of {} runs so far</b>; run the same command again to resume.").format(ended, planned)
         return Markup("<p class='verdict'>{} {}</p>").format(so_far, sentence[0].upper() + sentence[1:])
     kind = " bad" if failed or lost else ""
-    number = "1 run" if planned == 1 else f"{planned} runs"
-    return Markup("<p class='verdict{}'><b>{}</b>: {}</p>").format(kind, number, sentence)
+    return Markup("<p class='verdict{}'><b>{}</b>: {}</p>").format(kind, counted(planned, "run"), sentence)
 
 
 def _plan(results: CampaignResults) -> str:
@@ -78,10 +77,8 @@ def _plan(results: CampaignResults) -> str:
     varied = [f"{name.replace('_', ' ')} ({_values(results, name)})" for name in results.varied]
     points, repetitions = len(metadata["points"]), int(metadata["repetitions"])
     parts = [f"Varied: {'; '.join(varied)}" if varied else "Nothing is varied"]
-    number = f"{points} points" if points != 1 else "One point"
-    parts.append(
-        f"{number}, {repetitions} {'run' if repetitions == 1 else 'runs'} each; campaign's seed {metadata['seed']}"
-    )
+    number = counted(points, "point") if points != 1 else "One point"
+    parts.append(f"{number}, {counted(repetitions, 'run')} each; campaign's seed {metadata['seed']}")
     if metadata.get("paired"):
         parts.append("Runs of a repetition share a seed, so that points can be compared run by run")
     return ". ".join(parts) + "."

@@ -7,6 +7,7 @@ from markupsafe import Markup
 
 from handover.scenarios.campaign.results import CampaignResults, PointResults
 from handover.scenarios.campaign.statistics import paired_test
+from handover.scenarios.experiment.display_unit import counted
 from handover.scenarios.reporting.html import Cell, rows_table
 from handover.scenarios.reporting.page import Section
 
@@ -33,7 +34,7 @@ def pairs_section(results: CampaignResults) -> Section | None:
         "Pairs are runs with the same seed. p: McNemar's exact test, two-sided, not corrected for the number of tests."
     )
     if left:
-        text += f" {left} pairs of points more are left out."
+        text += f" Left out: {counted(left, 'more pair')} of points."
     header = ("of", "first", "second", "pairs", "both", "only first", "only second", "neither", "p")
     table = rows_table(header, rows, numbers=range(3, 9), sortable=True)
     html = Markup("<div class='tall names'>{}</div><p class='soft'>{}</p>").format(table, text)

@@ -12,7 +12,13 @@ import numpy as np
 from markupsafe import Markup
 
 from handover.scenarios.campaign.results import CampaignResults
-from handover.scenarios.experiment.display_unit import DisplayUnit, column_text, digits_after_point, display_unit
+from handover.scenarios.experiment.display_unit import (
+    DisplayUnit,
+    column_text,
+    counted,
+    digits_after_point,
+    display_unit,
+)
 from handover.scenarios.reporting.html import Cell, rows_table
 from handover.scenarios.reporting.page import Section
 
@@ -50,12 +56,8 @@ def runs_section(results: CampaignResults, folder: Path) -> Section | None:
         "placeholder='words, such as failed'></label>"
         "<output class='soft' data-counts='all-runs'>{}</output></div>\n"
         "<div id='all-runs' class='tall names'>{}</div><p class='soft'>{}</p>"
-    ).format(_number_of(rows), rows_table(header, rows, numbers=numbers, sortable=True), note)
+    ).format(counted(len(rows), "run"), rows_table(header, rows, numbers=numbers, sortable=True), note)
     return Section(anchor="runs", title="Runs", html=html, scripts=("campaign.js",))
-
-
-def _number_of(rows: Sequence[Any]) -> str:
-    return "1 run" if len(rows) == 1 else f"{len(rows)} runs"
 
 
 def run_html(name: str, folder: Path) -> Markup:

@@ -17,6 +17,7 @@ from handover.scenarios.cli.run import file_options
 from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
 from handover.scenarios.execution.progress import say
 from handover.scenarios.execution.request import RUNS, RunRequest
+from handover.scenarios.experiment.display_unit import counted
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.results.run_folder import RunFolder, dated_folder
 
@@ -129,7 +130,7 @@ async def _serve(session: "Session") -> None:
         _end_by_signals(page)
         say(f"play: http://{HOST}:{listening.getsockname()[1]}/  (Ctrl-C ends the session)")
         await serve(page, page.work(), listening)
-    runs = f"{page.runs} run{'' if page.runs == 1 else 's'}"
+    runs = counted(page.runs, "run")
     say(f"{runs} in {session.folder}" if any(session.folder.iterdir()) else "no run was begun")
 
 

@@ -27,6 +27,7 @@ from handover.scenarios.campaign.statistics import (
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.campaign_report.point_layout import PointLayout, layout_of, list_layout
 from handover.scenarios.comparison.entries import CampaignEntry, NotComparable, full_parameters
+from handover.scenarios.experiment.display_unit import counted
 
 ENTRY = "in campaign"
 """The parameter, in the table of all, that tells the campaigns apart; no parameter has a name with a space."""
@@ -314,7 +315,7 @@ def bounds_of_p(tests: Iterable[SuccessTest | MetricTest]) -> list[str]:
     enough = next(n for n in count(1) if least_p_of_pairs(n) < LEVEL)
     sentences: list[str] = []
     for paired, n, least in sorted(too_few, reverse=True):
-        of = (f"{n} pair{'' if n == 1 else 's'}") if paired else f"{n} run{'' if n == 1 else 's'} each"
+        of = counted(n, "pair") if paired else f"{counted(n, 'run')} each"
         more = f"{enough} pairs" if paired else "more runs"
         sentences.append(f"With {of} p cannot fall below {least:.3g}; with {more} it can be less than {LEVEL}.")
     return sentences

@@ -17,7 +17,7 @@ from handover.scenarios.comparison.campaigns import (
 )
 from handover.scenarios.comparison.entries import CampaignEntry, Difference, Entry, RunEntry
 from handover.scenarios.comparison.runs import MetricRow
-from handover.scenarios.experiment.display_unit import display_unit
+from handover.scenarios.experiment.display_unit import counted, display_unit
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import PRINTED_FORMATS
 from handover.scenarios.reporting.html import Cell, rows_table
@@ -63,7 +63,7 @@ def campaign_outcome(entry: CampaignEntry) -> str:
     """Return how many runs of a campaign ended and succeeded, in words."""
     results = entry.results
     ended, done = len(results.table), results.done
-    text = f"{results.successes} of {done} runs done succeeded"
+    text = f"{results.successes} of {counted(done, 'run')} done succeeded"
     if ended > done:
         text += f", {ended - done} failed to run or were lost"
     left = results.planned - ended

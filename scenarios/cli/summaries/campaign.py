@@ -15,7 +15,7 @@ from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.campaign.worker_pool import RunCounts
 from handover.scenarios.cli.campaign import format_progress
 from handover.scenarios.cli.console import heading, open_console
-from handover.scenarios.experiment.display_unit import display_unit
+from handover.scenarios.experiment.display_unit import counted, display_unit
 
 _MAX_POINTS = 12
 _MAX_REASONS = 5
@@ -51,7 +51,7 @@ def print_campaign(results: CampaignResults, counts: RunCounts, folder: Campaign
     console.print(_points(results, console))
     left = len(results.points) - _MAX_POINTS
     if left > 0:
-        console.print(f"  and {left} points more")
+        console.print(f"  and {counted(left, 'point')} more")
     print_reasons(console, results.table)
     console.print(f"table: {folder.table}", markup=False, soft_wrap=True)
 

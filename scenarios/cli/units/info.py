@@ -18,6 +18,7 @@ from handover.scenarios.execution.errors import UsageError, one_line_errors
 from handover.scenarios.execution.fmu_run import is_fmu
 from handover.scenarios.execution.selection import folder_fault, nothing_at
 from handover.scenarios.execution.ssp_run import is_ssp
+from handover.scenarios.experiment.display_unit import counted
 
 _HELP = """Show what is in FILE, an FMU (2.0 or 3.0, co-simulation) or an SSP: names, steps, capabilities, parameters,
 inputs, outputs and terminals; of an SSP its units, parameters and connections. Nothing is loaded or run; `handover
@@ -136,7 +137,9 @@ def _terminal_row(t: dict[str, Any]) -> tuple[str, ...]:
 def _print_system(data: dict[str, Any], parameters: Collection[FmuPort]) -> None:
     console = open_console()
     stop = "no stop time" if data["stop"] is None else f"until {data['stop']:g} s"
-    console.print(f"{data['name']}: a system of {len(data['units'])} units, {stop}", style="bold", markup=False)
+    console.print(
+        f"{data['name']}: a system of {counted(len(data['units']), 'unit')}, {stop}", style="bold", markup=False
+    )
     console.print("Units", style="bold")
     units = data["units"].items()
     print_rows(console, [(n, u["model"], f"FMI {u['fmi']}.0", f"{1000 * u['step']:.4g} ms") for n, u in units])

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from handover.controllers.free_flyer.handover_parameters import Params as DecisionParams
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PlacedUnit
+from handover.scenarios.experiment.display_unit import counted
 from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
 from handover.scenarios.free_flyer.handover.led_hand import end_of_track
 from handover.scenarios.free_flyer.handover.person_evaluation import Cause, Miss, PersonsDeeds
@@ -39,9 +40,9 @@ _PLURALS = {"delivery": "deliveries", "reception": "receptions"}
 _PEOPLE = {"HAND": "the person", "GRIPPER": "the robot"}
 
 
-def counted(failed: int, what: str) -> str:
+def counted_failures(failed: int, what: str) -> str:
     """Return how many deliveries or receptions failed, in words."""
-    return f"{failed} failed {what if failed == 1 else _PLURALS[what]}"
+    return counted(failed, f"failed {what}", f"failed {_PLURALS[what]}")
 
 
 def within_patience(phases: Sequence[tuple[str, float]], patience: float) -> str:
@@ -326,7 +327,7 @@ class HandoverEvaluator(Evaluator):
     def _success(self) -> str:
         received = [f"{_PEOPLE[t.receiver]} had the object at {t.done:.1f} s" for t in self.transfers]
         counts = {"delivery": self._failed_deliveries, "reception": self._failed}
-        failed = [counted(n, what) for what, n in counts.items() if n]
+        failed = [counted_failures(n, what) for what, n in counts.items() if n]
         after = f" after {' and '.join(failed)}" if failed else ""
         never = "never lost" if self._failed_deliveries else "never out of both hands"
         return " and ".join(received) + after + f", and it was {never}"
@@ -389,7 +390,7 @@ class HandoverEvaluator(Evaluator):
             return Cause.RECEPTIONS_FAILED, text
         if self._undelivered:
             how = "still held what it had released" if before == "VERIFY_RELEASE" else "was empty, and had not opened"
-            often = counted(self._failed_deliveries, "delivery")
+            often = counted_failures(self._failed_deliveries, "delivery")
             return Cause.DELIVERIES_FAILED, f"the robot gave up after {often}: its gripper {how}"
         if before == "GRASP_OBJECT":
             off = "" if self._off is None else f": the object was {1000.0 * self._off:.0f} mm from its fingers"

@@ -23,7 +23,7 @@ from handover.cosim.system.system import PlacedUnit
 from handover.plants.free_flyer.hand.box import Box
 from handover.plants.free_flyer.large_object.parameters import Params as LargeObjectParams
 from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
-from handover.scenarios.free_flyer.handover.handover_evaluation import counted, not_over, within_patience
+from handover.scenarios.free_flyer.handover.handover_evaluation import counted_failures, not_over, within_patience
 from handover.scenarios.free_flyer.model_mismatch import model_mismatch
 from handover.scenarios.free_flyer.parameters import ROBOTS, TeamParameters, TeamTask
 from handover.scenarios.free_flyer.penetration import HandInCube
@@ -220,10 +220,10 @@ class TeamEvaluator(Evaluator):
 
     def _success(self) -> str:
         whom = "the person" if self.parameters.task is TeamTask.ROBOTS_TO_HUMAN else "both robots"
-        again = f" after {counted(self._failed, 'reception')}" if self._failed else ""
+        again = f" after {counted_failures(self._failed, 'reception')}" if self._failed else ""
         never = "never out of all hands"
         if self._failed_deliveries:
-            again, never = f" after {counted(self._failed_deliveries, 'delivery')}", "never lost"
+            again, never = f" after {counted_failures(self._failed_deliveries, 'delivery')}", "never lost"
         return f"{whom} had the object at {self.done:.1f} s{again}, and it was {never}"
 
     def _metrics(self) -> dict[str, Metric]:
@@ -296,7 +296,7 @@ class TeamEvaluator(Evaluator):
             return TeamCause.ONE_RECEIVED_ALONE, f"gripper {self._grippers} took the object alone; {self._where}"
         given_up = [robot for robot in self.robots if robot.phase == "GIVEN_UP"]
         if any(robot.undelivered for robot in given_up):
-            often = counted(self._failed_deliveries, "delivery")
+            often = counted_failures(self._failed_deliveries, "delivery")
             return TeamCause.DELIVERIES_FAILED, f"the robots gave up after {often}; {self._where}"
         if given_up:
             return self._given_up(given_up[0])
@@ -339,7 +339,7 @@ class TeamEvaluator(Evaluator):
             text = f"the {touch} stayed below the threshold: {robot.fastest:.3f} of {threshold:.3f} m/s"
             return TeamCause.NOT_FELT, f"the robots never felt a {touch}{within}: {text}; {self._where}"
         if before == "CHECK_ANGLE":
-            often = counted(self._failed, "reception")
+            often = counted_failures(self._failed, "reception")
             return TeamCause.RECEPTIONS_FAILED, f"they gave up after {often}; {self._where}"
         if before == "GRASP_OBJECT":
             without = _which(3 & ~self._grippers, "gripper")

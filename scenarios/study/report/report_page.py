@@ -6,6 +6,7 @@ from pathlib import Path
 
 from markupsafe import Markup
 
+from handover.scenarios.experiment.display_unit import counted
 from handover.scenarios.reporting.html import rows_table
 from handover.scenarios.reporting.page import Section, template, write_page
 from handover.scenarios.study.folder.codebook import PILOT
@@ -76,23 +77,19 @@ def _header(analysis: StudyAnalysis) -> Markup:
     lines: list[Markup] = []
     if plan.pilot:
         lines.append(Markup("<p class='verdict bad'><b>Scripted pilot</b>: no person took part.</p>"))
-    who = _counted(n, PILOT if plan.pilot else "participant")
-    counted, played = len(analysis.counted), len(analysis.rounds)
-    text = f"{plan.participants} are planned; {counted} of {played} rounds that were played count."
+    who = counted(n, PILOT if plan.pilot else "participant")
+    valid, played = len(analysis.counted), len(analysis.rounds)
+    text = f"{plan.participants} are planned; {valid} of {played} rounds that were played count."
     if incomplete:
         text += f" Not complete: {', '.join(incomplete)}."
     if withdrawn := len(analysis.study.withdrawals):
-        text += f" {_counted(withdrawn, 'participant')} withdrew, and {'is' if withdrawn == 1 else 'are'} in no result."
+        text += f" {counted(withdrawn, 'participant')} withdrew, and {'is' if withdrawn == 1 else 'are'} in no result."
     lines.append(Markup("<p class='verdict'><b>{}</b>: {}</p>").format(who, text))
     if n:
         lines.append(note(balance_of_complete(plan, [s.session.number for s in analysis.complete_sessions])))
     if 0 < n < MIN_PARTICIPANTS:
         lines.append(note(f"Fewer than {MIN_PARTICIPANTS} are too few for a test: none is made."))
     return Markup("\n").join(lines)
-
-
-def _counted(n: int, what: str) -> str:
-    return f"{n} {what}" if n == 1 else f"{n} {what}s"
 
 
 def _participants_section(analysis: StudyAnalysis) -> Section:
@@ -192,7 +189,7 @@ def _withdrawals(analysis: StudyAnalysis) -> Markup:
         for number, w in withdrawals.items()
     ]
     header = ("participant", "withdrew", "", "what was kept of them")
-    return rows_table(header, rows, caption=f"Withdrawn: {_counted(len(rows), 'participant')}, in no table and no test")
+    return rows_table(header, rows, caption=f"Withdrawn: {counted(len(rows), 'participant')}, in no table and no test")
 
 
 def _entering(analysis: StudyAnalysis, words: Words) -> Markup:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from markupsafe import Markup
 
+from handover.scenarios.experiment.display_unit import counted
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.free_flyer.parameters import Behaviour, Task
 from handover.scenarios.published.free_flyer.handovers import STUDIED, published_failures
@@ -114,8 +115,8 @@ def _failed_rounds(analysis: StudyAnalysis, words: Words) -> Markup:
     ]
     header = ("participant", "round", "task", "behaviour", "by the rule", "by ground truth")
     table = rows_table(header, rows, numbers=(1,))
-    return Markup("<details><summary>What happened in {} {}</summary>{}</details>").format(
-        len(failed), "round" if len(failed) == 1 else "rounds", table
+    return Markup("<details><summary>What happened in {}</summary>{}</details>").format(
+        counted(len(failed), "round"), table
     )
 
 

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from handover.scenarios.experiment.display_unit import column_text, digits_after_point, display_unit
+from handover.scenarios.experiment.display_unit import column_text, counted, digits_after_point, display_unit
 
 
 @pytest.mark.parametrize(
@@ -51,3 +51,8 @@ def test_numbers_of_a_column_have_the_same_digits_after_the_point():
 def test_numbers_that_fixed_digits_do_not_suit_have_an_exponent(values: list[float], texts: list[str]):
     digits = digits_after_point(values)
     assert [column_text(value, digits) for value in values] == texts
+
+
+def test_a_number_of_things_is_said_in_its_grammar():
+    assert [counted(n, "run") for n in (0, 1, 2)] == ["0 runs", "1 run", "2 runs"]
+    assert [counted(n, "axis", "axes") for n in (1, 3)] == ["1 axis", "3 axes"]
