@@ -54,7 +54,7 @@ _POINTS: Mapping[str, Sequence[int]] = {
     "helix-disturbances": (0, 4, 8, 12),
     "helix-improvements": (128, 208),
     "helix-places": range(0, 200, 40),
-    "helix-reflex": (0, 1, 2, 3),
+    "helix-reflex": range(9),
     "helix-workspace": range(0, 50, 4),
     "ir-convergence": range(0, 10, 2),
     "ir-limits": range(0, 125, 5),
@@ -67,6 +67,10 @@ _POINTS: Mapping[str, Sequence[int]] = {
 
 _PIXELS_ON_PAPER = 96.0
 """Of a screen, by CSS, an inch."""
+
+
+class EmptyTable(ValueError):
+    """A table of an experiment in which none of the few runs shows anything."""
 
 
 @dataclass(frozen=True)
@@ -184,11 +188,16 @@ def kept_campaign(name: str) -> Path:
 
 
 def gallery_experiment(name: str, files: Path) -> GalleryExperiment:
-    """Carry out an experiment with few runs, unless that is kept, and copy its figures below the site's files."""
+    """Carry out an experiment with few runs, unless that is kept, and copy its figures below the site's files.
+
+    Raises:
+        EmptyTable: a table has no value.
+    """
     experiment = EXPERIMENTS[name]()
     campaign = kept_campaign(name)
     table = CampaignTable.read(campaign)
     results = PaperResults.of(experiment, table, campaign / "runs")
+    check_tables(name, results.tables)
     return GalleryExperiment(
         title=experiment.title,
         doc=experiment.__doc__ or "",
@@ -205,6 +214,16 @@ def gallery_experiment(name: str, files: Path) -> GalleryExperiment:
         ),
         metrics=[MetricRow(n, unit_symbol(table.unit(n)), table.description(n)) for n in table.metrics],
     )
+
+
+def check_tables(name: str, tables: Iterable[ComparisonTable]) -> None:
+    """Raise an error if an experiment's table has no value beside the names of its rows.
+
+    Raises:
+        EmptyTable: it names the table, and where the runs are chosen.
+    """
+    if empty := [table.title for table in tables if not any(any(row[1:]) for row in table.rows)]:
+        raise EmptyTable(f"{name}: no value in the table {'; '.join(empty)}: choose other points in _POINTS")
 
 
 def plan_few_runs(name: str, points: Sequence[int]) -> None:

@@ -10,6 +10,7 @@ from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.statistics import LEVEL, paired_difference, paired_test
 from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.experiment.display_unit import counted
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import COLOURS, figure
 from handover.scenarios.helix.reflex_grasp_parameters import ReflexGraspParameters
@@ -114,9 +115,9 @@ class HelixReflex(PublishedExperiment):
         ]
         tests = " ".join(_tests(CAMERAS[c], pairs(table, c)) for c in CAMERAS)
         note = (
-            "Medians, with intervals by bootstrap, of the runs in which the gripper closed: where the ball was beside "
-            "and along the gripper's axis as it began to, by ground truth, and how far from there the controller had "
-            f"it; then beside the axis as it left the hand. {tests}"
+            "Medians, with intervals by bootstrap, of the runs in which the gripper closed. They are the ball's offset "
+            "beside and along the gripper's axis as it began to close, by ground truth, and the controller's error of "
+            f"that; then the offset beside the axis as the ball left the hand. {tests}"
         )
         return [
             ComparisonTable(title="With and without the reflex", header=header, rows=cells, note=note),
@@ -150,7 +151,7 @@ def of_case(table: CampaignTable, cameras: str, reflex: bool, mismatch: str | No
     expected: Mapping[str, str] = {} if mismatch is None else MISMATCHES[mismatch]
     model = [float(expected[name] if name in expected else getattr(_USUAL, name)) for name in _OF_MODEL]
     rows = [row for row in table.rows if row["status"] == "done"]
-    rows = [row for row in rows if [_value(row, name) for name in _OF_MODEL] == model]
+    rows = [row for row in rows if [_setting(row, name) for name in _OF_MODEL] == model]
     return [row for row in rows if row["cameras"] == cameras and str(row["reflex"]).lower() == str(reflex).lower()]
 
 
@@ -177,6 +178,12 @@ def _value(row: Row, name: str) -> float:
     return np.nan if value is None else float(value)
 
 
+def _setting(row: Row, name: str) -> float:
+    """Return a parameter's value; a table of points that do not set it lacks its column."""
+    value = row.get(name)
+    return float(getattr(_USUAL, name) if value is None else value)
+
+
 def _centres(claim: str, of_pairs: Sequence[tuple[Row, Row]]) -> Claim:
     d = offsets(of_pairs)
     test = paired_difference(d[:, 0], d[:, 1])
@@ -190,9 +197,10 @@ def _centres(claim: str, of_pairs: Sequence[tuple[Row, Row]]) -> Claim:
         interval=None if test.interval is None else (test.interval.low, test.interval.high),
         unit="m",
         verdict=verdict_of(test.p < LEVEL and test.difference < 0.0, could_be_either=len(d) >= _MIN_PAIRS),
-        reason=f"Holds if Wilcoxon's signed-rank test, two-sided, of the {len(d)} pairs in which the gripper closed "
-        f"both times rejects that nothing changes (p = {format_p_value(test.p)}) and the median of the differences is "
-        f"below 0; the interval is that median's. Of {len(of_pairs)} pairs the others say nothing here.",
+        reason=f"Holds if Wilcoxon's signed-rank test, two-sided, of {counted(len(d), 'pair')} in which the "
+        f"gripper closed both times rejects that nothing changes (p = {format_p_value(test.p)}) and the median "
+        f"of the differences is below 0. The interval is that median's. Of {counted(len(of_pairs), 'pair')} the "
+        "others say nothing here.",
         beyond=True,
     )
 
@@ -218,7 +226,7 @@ def _in_spite_of_mismatches(of_pairs: Mapping[str, Sequence[tuple[Row, Row]]]) -
         ),
         reason="Medians. Holds if for each of them Wilcoxon's signed-rank test, two-sided, rejects at "
         f"{format_share(LEVEL)}, and the median of the differences is below 0; as all must, no correction is needed. "
-        f"Least clear: {worst}, {len(both_closed[worst])} pairs, p = {format_p_value(found[worst].p)}.",
+        f"Least clear: {worst}, {counted(len(both_closed[worst]), 'pair')}, p = {format_p_value(found[worst].p)}.",
         beyond=True,
     )
 

@@ -70,6 +70,13 @@ def test_of_few_runs_nothing_is_concluded():
         assert {c.verdict for c in HelixReflex().claims(table)} == {FEW}
 
 
+def test_runs_of_points_that_set_no_mismatch_are_found_without_its_columns():
+    names = {name for values in MISMATCHES.values() for name in values}
+    whole = [r for r in table_of(2).rows if r["expected_radius"] == ReflexGraspParameters().expected_radius]
+    few = made_table([{k: v for k, v in row.items() if k not in names} for row in whole])
+    assert len(pairs(few, "covered")) == len(pairs(few, "free")) == 2
+
+
 def test_offsets_are_those_of_seeds_that_closed_both_times():
     of_pairs = pairs(table_of(failed={("covered", False): 3, ("covered", True): 5}), "covered")
     assert len(of_pairs) == 40
