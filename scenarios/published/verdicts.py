@@ -24,12 +24,13 @@ from handover.scenarios.campaign.statistics import (
     time_interval,
     two_proportions,
 )
+from handover.scenarios.experiment.display_unit import counted
 from handover.scenarios.published.published_experiment import Claim, Verdict
 
 FEW = 0.10
 """Share of runs below which something counts as not happening."""
 
-_MIN_FOR_EVERY = 4
+MIN_FOR_EVERY = 4
 """Trials of which something is concluded that is to succeed every time."""
 
 _MIN_DIFFERING = next(k for k in range(1, 64) if 2.0 ** (1 - k) < LEVEL)
@@ -83,8 +84,8 @@ def every_claim(claim: str, where: str, published: tuple[int, int], measured: tu
         published=published_rate,
         measured=format_rate(*measured),
         interval=(interval.low, interval.high),
-        verdict=verdict_of(all_do, could_be_either=measured[1] >= _MIN_FOR_EVERY),
-        reason=with_shortfall(f"{rule} {note}", measured[1], _MIN_FOR_EVERY),
+        verdict=verdict_of(all_do, could_be_either=measured[1] >= MIN_FOR_EVERY),
+        reason=with_shortfall(f"{rule} {note}", measured[1], MIN_FOR_EVERY),
         where=where,
         beyond=not published[1],
     )
@@ -109,8 +110,8 @@ def order_claim(
     test, n = paired_test(first, second), len(first)
     reason = (
         f"{'Holds' if beyond else 'Reproduced'} if McNemar's exact test of runs in the same scenes rejects at "
-        f"{format_share(LEVEL)}, in this direction: of {n} pairs only the first succeeded in {test.only_first}, only "
-        f"the second in {test.only_second}; p = {format_p_value(test.p)}. {note}"
+        f"{format_share(LEVEL)}, in this direction: of {counted(n, 'pair')} only the first succeeded in "
+        f"{test.only_first}, only the second in {test.only_second}; p = {format_p_value(test.p)}. {note}"
     )
     return Claim(
         claim=claim,
@@ -135,7 +136,7 @@ def no_worse_claim(claim: str, first: Sequence[bool], second: Sequence[bool]) ->
     interval = success_interval(test.only_second, n)
     reason = (
         "Holds if the share of scenes in which only the second succeeds has an interval (Clopper-Pearson) below "
-        f"{format_share(FEW)}: of {n} pairs that is so in {test.only_second}, "
+        f"{format_share(FEW)}: of {counted(n, 'pair')} that is so in {test.only_second}, "
         f"{format_interval(interval.low, interval.high)}; the reverse in {test.only_first}; McNemar's p = "
         f"{format_p_value(test.p)}."
     )
@@ -235,9 +236,10 @@ def min_trials_for(share: float) -> int:
 
 def with_shortfall(reason: str, n: int, min_trials: int) -> str:
     """Add to a reason that the trials are too few for its rule to be met, if they are."""
-    runs = "1 run" if n == 1 else f"{n} runs"
     shortfall = (
-        f"With {runs} nothing could have met this rule: it takes at least {min_trials}." if n < min_trials else ""
+        f"With {counted(n, 'run')} nothing could have met this rule: it takes at least {min_trials}."
+        if n < min_trials
+        else ""
     )
     return f"{reason.strip()} {shortfall}".strip()
 

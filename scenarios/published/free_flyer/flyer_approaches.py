@@ -96,8 +96,8 @@ class FlyerApproaches(PublishedExperiment):
                 "Approaches to places where nobody is",
                 [_row(*case) for case in cases if len(case[-1])],
                 "How many robots came, found rest and signalled; how many then let go or closed though nobody touched "
-                "them; and the greatest distance from the place as they began to yield, and speed that they saw of "
-                "their gripper while they waited.",
+                "them. Distance and speed are the greatest: from the place as they began to yield, and of the gripper, "
+                "as they measured it, while they waited.",
             )
         ]
 

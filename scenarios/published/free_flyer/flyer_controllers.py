@@ -212,9 +212,9 @@ def _table(title: str, runs: Runs, cases: Sequence[Case]) -> ComparisonTable:
             cells = {name: _cell(of) for name, of in found.items()}
             rows.append({"handover": case[2].label or TASKS[case[0]], "behaviour": b.item, **cells})
     note = (
-        "Successes of runs, and means: how far the gripper went at most from the signal for as long as the robot "
-        "yielded; the greatest force on the hand until the first receiver has the object, and the time until then. No "
-        "thrust: while it yields the robot coasts; it flies as ever."
+        "Successes of runs, and three means. Displacement: how far the gripper went at most from the signal on, for as "
+        "long as the robot yielded. Force: the greatest on the hand until the first receiver has the object. Time: "
+        "until then. No thrust: while it yields the robot coasts; else it flies as usual."
     )
     return table_of(title, rows, note)
 

@@ -93,9 +93,9 @@ def point_of(task: Task, behaviour: Behaviour, propulsion: Propulsion, variation
 class FlyerHandoverTable(PublishedExperiment):
     """The four handovers by the rigid and by the compliant robot, with ideal thrust, Astrobee's limits and its nozzles.
 
-    Besides, where the robot gives: persons who pull with other forces, arms of other lengths, other places; and where
-    it gives or receives: the control rate that the thesis prints, and a robot that yields while it still moves, for
-    the thesis names no condition of rest. The quick plan is one run of each of the first 24.
+    Where the robot gives, there are besides persons who pull with other forces, arms of other lengths, other places.
+    Where it gives or receives, there are the control rate that the thesis prints, and a robot that yields while it
+    still moves, for the thesis names no condition of rest. The quick plan is one run of each of the first 24.
     """
 
     name: ClassVar[str] = "flyer-handover"
@@ -439,11 +439,11 @@ def _at_rates(runs: HandoverRuns, exchange: Exchange, behaviour: Behaviour, metr
 
 
 _NOTE_ON_TRANSFERS = (
-    "Received: the receiver of this transfer got the object, whatever came of the rest. Medians of runs that "
-    "succeeded, or in parentheses, where none did, of what they reached: how far the gripper went at most from its "
-    "place along the axes of W for as long as the robot yielded; the times from the last signal to release or "
-    "closing, and from the first signal until the receiver had the object alone; and the share of the run for which "
-    "more was commanded than the thrusters give. Published: 40 mm (rigid) and 140 mm (compliant) along z where the "
+    "Received: the receiver of this transfer got the object, whatever came of the rest. Medians are of runs that "
+    "succeeded; in parentheses, where none did, of what all reached. Along x, y, z of W, and in all: how far the "
+    "gripper went at most from its place for as long as the robot yielded. Felt after: from the last signal to release "
+    "or closing. Taken after: from the first signal until the receiver had the object alone. At the limits: the share "
+    "of the run for which more was commanded than the thrusters give. Published: 40 mm (rigid) and 140 mm (compliant) along z where the "
     "robot gives, and twice as much of the compliant robot along x where it receives."
 )
 

@@ -142,10 +142,11 @@ class FlyerNavigation(PublishedExperiment):
         runs = self.runs(table, is_known)
         rows = [row for v in (Variation("as usual"), *VARIATIONS) if (row := _row(runs, v))]
         note = (
-            "Successes of runs with their interval (Clopper-Pearson), of both behaviours, where a run in which the "
-            "robot acted with nobody at the gripper is none; in how many the object changed hands, even if the robot "
-            "then never came to rest where it retreats to; medians, without the runs in which it acted alone, giving "
-            f"and receiving; and what decided most failures. Drifts have a correlation time of {_DRIFT_TIME:g} s."
+            "Successes of runs of both behaviours, with their interval (Clopper-Pearson). A run in which the robot "
+            "acted with nobody at the gripper is no success. Changed hands: runs in which the object did, even if the "
+            "robot then never came to rest where it retreats to. Displacement and time are medians, giving and "
+            "receiving, without the runs in which it acted alone. The last column has what decided most failures. "
+            f"Drifts have a correlation time of {_DRIFT_TIME:g} s."
         )
         return [table_of("Errors of the navigation", rows, note)] if rows else []
 

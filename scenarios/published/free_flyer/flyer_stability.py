@@ -13,6 +13,7 @@ from handover.cosim.stepping.options import Algorithm, MasterOptions
 from handover.plants.free_flyer.robot.thrusters import Params as ThrustersParams
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.experiment.display_unit import counted
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import COLOURS
 from handover.scenarios.free_flyer.parameters import Behaviour
@@ -105,7 +106,7 @@ class FlyerStability(PublishedExperiment):
         )
         agree, stable = sum(said is rests for said, rests in clear), sum(said for said, _ in clear)
         claim = says.judged(
-            f"{agree} of {len(clear)} runs, of which {stable} are stable by their poles; {len(near)} near the unit "
+            f"{agree} of {counted(len(clear), 'run')}, of which {stable} are stable by their poles; {len(near)} near the unit "
             "circle left out",
             agree == len(clear) and not lost,
             f"all do whose largest pole is more than {_MARGIN:g} from the unit circle, and none was lost",

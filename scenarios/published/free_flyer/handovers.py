@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 from handover.cosim.blocks.ports import Floats
 from handover.plants.free_flyer.robot.navigation import Params as NavigationParams
+from handover.scenarios.experiment.display_unit import counted
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.free_flyer.parameters import Behaviour, Task
 from handover.scenarios.published.runs import Count, Point, Runs, is_done
@@ -125,7 +126,8 @@ def succeeded_touched(runs: Runs) -> Count:
 def unfinished_note(runs: Runs) -> str:
     """Return a sentence on the runs that did not come to their end; "" if all did."""
     count = sum(not is_done(row) for row in runs)
-    return f"{count} of {len(runs)} runs did not come to their end, and count as failures." if count else ""
+    of = counted(len(runs), "run")
+    return f"Counted as failures: {count} of {of}, which did not come to an end." if count else ""
 
 
 def every_of(runs: Sequence[Runs]) -> Runs:

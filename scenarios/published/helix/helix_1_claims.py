@@ -16,15 +16,21 @@ from handover.scenarios.campaign.statistics import (
     LEVEL,
     MIN_SAMPLES,
     RESAMPLES,
-    success_interval,
     time_interval,
-    two_proportions,
 )
+from handover.scenarios.experiment.display_unit import counted
 from handover.scenarios.helix.evaluation import FIG_9_RESOLUTION
 from handover.scenarios.helix.parameters import settings_of
 from handover.scenarios.published.helix.helix_1_runs import Helix1Runs, missing, published, too_few
 from handover.scenarios.published.published_experiment import Claim, Verdict
-from handover.scenarios.published.verdicts import format_p_value, ratio_interval
+from handover.scenarios.published.verdicts import (
+    MIN_FOR_EVERY,
+    every_claim,
+    format_p_value,
+    ratio_interval,
+    verdict_of,
+    with_shortfall,
+)
 
 NEAR = 0.005
 """How near to the ball the gripper is to end, m."""
@@ -74,8 +80,12 @@ def ends_near(when: str, taken: Sequence[Mapping[str, Any]]) -> Claim:
     return Claim(
         **facts,
         measured=f"{1e3 * np.median(distances):.1f} mm in the median, {1e3 * distances.max():.1f} mm at most",
-        verdict=Verdict.REPRODUCED if distances.max() <= NEAR else Verdict.NOT_REPRODUCED,
-        reason=f"Holds if each of the {len(distances)} handovers that succeeded ends so near, by ground truth.",
+        verdict=verdict_of(bool(distances.max() <= NEAR), could_be_either=len(distances) >= MIN_FOR_EVERY),
+        reason=with_shortfall(
+            f"Holds if each of the {len(distances)} handovers that succeeded ends so near, by ground truth.",
+            len(distances),
+            MIN_FOR_EVERY,
+        ),
     )
 
 
@@ -94,7 +104,7 @@ def _falls(arm: Helix1Runs) -> Claim:
     }
     blocks = arm.blocks()
     if len(blocks) < 2:
-        return too_few(facts, f"{len(blocks)} places with runs at every step size")
+        return too_few(facts, f"{counted(len(blocks), 'place')} with runs at every step size")
     p = float(page_trend_test(blocks[:, ::-1], method="exact").pvalue)
     ours = np.median(blocks, axis=0)
     falls = bool(np.all(ours[:-1] > ours[1:])) and p < LEVEL
@@ -103,8 +113,8 @@ def _falls(arm: Helix1Runs) -> Claim:
         measured=", ".join(f"{m:.1f}" if np.isfinite(m) else "never" for m in ours) + " s (medians)",
         verdict=Verdict.REPRODUCED if falls else Verdict.NOT_REPRODUCED,
         reason=f"Reproduced if the medians fall, and Page's exact test of a trend within places rejects: p = "
-        f"{format_p_value(p)}, {len(blocks)} places and repetitions. A run that never closes the gripper counts as "
-        "longer than any.",
+        f"{format_p_value(p)}, {counted(len(blocks), 'pair')} of place and repetition. A run that "
+        "never closes the gripper counts as longer than any.",
     )
 
 
@@ -118,7 +128,7 @@ def _halves(arm: Helix1Runs, small: float, large: float) -> Claim:
     }
     x, y = arm.times(small), arm.times(large)
     if min(len(x), len(y)) < MIN_SAMPLES:
-        return too_few(facts, f"{len(x)} and {len(y)} runs")
+        return too_few(facts, f"{counted(len(x), 'run')} and {len(y)}")
     interval = ratio_interval(x, y, np.median)
     if interval is None:
         return too_few(facts, "no times to divide by")
@@ -145,7 +155,7 @@ def _halves_unevenly(arm: Helix1Runs) -> Claim:
     }
     times = [arm.times(alpha) for alpha in arm.alphas]
     if min(map(len, times)) < MIN_SAMPLES:
-        return too_few(facts, f"{min(map(len, times))} runs at a step size")
+        return too_few(facts, f"{counted(min(map(len, times)), 'run')} at a step size")
     ours = [float(np.median(x)) for x in times]
     low, high = _uneven_interval(times)
     holds_1 = low <= 1.0 <= high
@@ -180,7 +190,7 @@ def _takes(arm: Helix1Runs, alpha: float) -> Claim:
     x = arm.times(alpha)
     interval = time_interval(x, np.mean)
     if interval is None:
-        return too_few(facts, f"{len(x)} runs")
+        return too_few(facts, counted(len(x), "run"))
     ours = float(np.mean(x)), float(np.std(x, ddof=1))
     p = float(ttest_ind_from_stats(*ours, len(x), mean, std, printed["runs"], equal_var=False).pvalue)
     return Claim(
@@ -189,9 +199,9 @@ def _takes(arm: Helix1Runs, alpha: float) -> Claim:
         interval=(interval.low, interval.high),
         unit="s",
         verdict=Verdict.REPRODUCED if p >= LEVEL else Verdict.NOT_REPRODUCED,
-        reason=f"Reproduced if Welch's test does not tell the two means apart: p = {format_p_value(p)}, {len(x)} runs "
-        f"against {printed['runs']}. The interval is the mean's ({interval.method}).{missing(arm, alpha)}"
-        f"{_stall(arm, alpha)}",
+        reason=f"Reproduced if Welch's test does not tell the two means apart: p = {format_p_value(p)}, "
+        f"{counted(len(x), 'run')} against {printed['runs']}. The interval is the mean's ({interval.method})."
+        f"{missing(arm, alpha)}{_stall(arm, alpha)}",
     )
 
 
@@ -216,7 +226,7 @@ def _narrows(arm: Helix1Runs) -> Claim:
     }
     times = [arm.times(alpha) for alpha in arm.alphas]
     if min(map(len, times)) < MIN_SAMPLES:
-        return too_few(facts, f"{min(map(len, times))} runs at a step size")
+        return too_few(facts, f"{counted(min(map(len, times)), 'run')} at a step size")
     interval = ratio_interval(times[-1], times[0], _spread)
     ours = [float(np.std(x, ddof=1)) for x in times]
     narrows = all(a > b for a, b in pairwise(ours)) and interval is not None and interval[1] < 1.0
@@ -244,18 +254,7 @@ def _succeeds(arm: Helix1Runs) -> Claim:
 
 def _rate(arm: Helix1Runs, claim: str, successes: int) -> Claim:
     k, n = published()["success"]
-    facts: dict[str, Any] = {"claim": claim, "published": f"{k} of {n}", "where": "sec. 4"}
-    if not arm.tried:
-        return too_few(facts, "no runs")
-    interval, p = success_interval(successes, arm.tried), two_proportions(successes, arm.tried, k, n)
-    rule = "Reproduced if every run does; the interval is Clopper and Pearson's"
-    return Claim(
-        **facts,
-        measured=f"{successes} of {arm.tried}",
-        interval=(interval.low, interval.high),
-        verdict=Verdict.REPRODUCED if successes == arm.tried else Verdict.NOT_REPRODUCED,
-        reason=f"{rule}. Fisher's exact test against the published rate: p = {format_p_value(p)}.{_broken(arm)}",
-    )
+    return every_claim(claim, "sec. 4", (k, n), (successes, arm.tried), _broken(arm))
 
 
 def _mismatch(arm: Helix1Runs) -> Claim:
@@ -269,7 +268,7 @@ def _mismatch(arm: Helix1Runs) -> Claim:
     values = [arm.metric(name, alpha) for name in named]
     interval = time_interval(values[0], np.mean)
     if interval is None:
-        return too_few(facts, f"{len(values[0])} runs at step size {alpha}")
+        return too_few(facts, f"{counted(len(values[0]), 'run')} at step size {alpha}")
     agrees = interval.low - FIG_9_RESOLUTION <= printed["model_mismatch"] <= interval.high + FIG_9_RESOLUTION
     return Claim(
         **facts,
@@ -299,15 +298,8 @@ def _timestep(arm: Helix1Runs) -> Claim:
 
 
 def _own_success(own: Helix1Runs) -> Claim:
-    interval = success_interval(own.succeeded, own.tried)
-    return Claim(
-        claim="With our settings every handover succeeds",
-        published="",
-        measured=f"{own.succeeded} of {own.tried}",
-        interval=(interval.low, interval.high),
-        verdict=Verdict.REPRODUCED if own.succeeded == own.tried else Verdict.NOT_REPRODUCED,
-        reason=f"Holds if every run does; the interval is Clopper and Pearson's.{_broken(own)}",
-        beyond=True,
+    return every_claim(
+        "With our settings every handover succeeds", "", (0, 0), (own.succeeded, own.tried), _broken(own)
     )
 
 
@@ -333,4 +325,4 @@ def _nearer(thesis: Helix1Runs, own: Helix1Runs) -> Claim:
 
 
 def _broken(arm: Helix1Runs) -> str:
-    return f" {arm.broken} runs that did not come to their end do not count." if arm.broken else ""
+    return f"Not counted: {counted(arm.broken, 'run')} that did not come to an end." if arm.broken else ""

@@ -8,6 +8,7 @@ import numpy as np
 
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.experiment.display_unit import counted
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.helix.parameters import Tuning
 from handover.scenarios.published.published_experiment import Claim
@@ -112,4 +113,4 @@ def too_few(facts: dict[str, Any], what: str) -> Claim:
 def missing(arm: Helix1Runs, *alphas: float) -> str:
     """Return a sentence on how many runs have no time, as the gripper never began to close; "" if all have one."""
     number = sum(len(arm.rows[alpha]) - len(arm.times(alpha)) for alpha in alphas)
-    return f" Without {number} runs in which the gripper never began to close." if number else ""
+    return f" Without {counted(number, 'run')} in which the gripper never began to close." if number else ""

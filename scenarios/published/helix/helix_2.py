@@ -13,6 +13,7 @@ from handover.cosim.record.reader import Record
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.statistics import LEVEL
 from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.experiment.display_unit import counted
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import COLOURS, figure
@@ -149,8 +150,8 @@ def _faster(runs: GuidedRuns) -> Claim:
         measured=f"{_seconds(guided)} against {_seconds(alone)} (medians)",
         verdict=Verdict.NOT_COMPARABLE if least >= LEVEL else verdict,
         reason="Reproduced if the guided runs' median is less and the exact test of Mann and Whitney, two-sided, "
-        f"rejects that the times are alike: p = {format_p_value(p)}, {len(guided)} and {len(alone)} runs. A run that "
-        f"never closes the gripper counts as longer than any.{short}",
+        f"rejects that the times are alike: p = {format_p_value(p)}, {counted(len(guided), 'run')} and {len(alone)}. "
+        f"A run that never closes the gripper counts as longer than any.{short}",
     )
 
 

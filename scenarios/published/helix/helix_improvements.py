@@ -13,6 +13,7 @@ from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.statistics import LEVEL
 from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.experiment.display_unit import counted
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import COLOURS, figure
 from handover.scenarios.published.helix.helix_cases import (
@@ -121,7 +122,7 @@ class HelixImprovements(PublishedExperiment):
         cells = [_row(x, *runs_of) for x, runs_of in _runs(table).items() if runs_of[1]]
         tried = max((len(before) for before, _ in _runs(table).values()), default=0)
         note = (
-            f"Without and with the change, at {tried} places with the same seeds. Distance of gripper and "
+            f"Without and with the change, at {counted(tried, 'place')} with the same seeds. Distance of gripper and "
             "ball, by ground truth, when the gripper begins to close, and control steps until then: medians over the "
             "places at which both did. p is that of Wilcoxon's signed-rank test of the distances."
         )
@@ -212,6 +213,6 @@ def _closes_nearer(change: Change, before: Sequence[Mapping[str, Any]], after: S
         f"{successes[0]} of {len(before)} and {successes[1]} of {len(after)} succeed",
         verdict=Verdict.NOT_COMPARABLE if least >= LEVEL else verdict,
         reason="Reproduced if the median distance is less, Wilcoxon's signed-rank test of the pairs, two-sided, "
-        f"rejects that nothing changes (p = {format_p_value(p)}, {len(d)} pairs; {format_p_value(least)} at least), "
-        "and no fewer handovers succeed.",
+        f"rejects that nothing changes (p = {format_p_value(p)}, {counted(len(d), 'pair')}; "
+        f"{format_p_value(least)} at least), and no fewer handovers succeed.",
     )

@@ -13,6 +13,7 @@ from handover.controllers.helix.servo.servo_parameters import Params as ServoPar
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.experiment.display_unit import counted
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import COLOURS, figure
 from handover.scenarios.helix.workspace import cameras_that_see, reach
@@ -154,7 +155,8 @@ def _limited_by_cameras(table: CampaignTable) -> Claim:
     only_reached = sum(b and not a for a, b in zip(seen, reached, strict=True))
     return Claim(
         **facts,
-        measured=f"of {len(rows)} places {only_reached} are reached and not seen, {only_seen} seen and not reached",
+        measured=f"of {counted(len(rows), 'place')} {only_reached} are reached and not seen, "
+        f"{only_seen} seen and not reached",
         verdict=_if_whole(table, only_reached > only_seen),
         reason="Reproduced if more of the tried places are within reach and out of view than the other way round; a "
         f"part of the {_WHOLE} places decides nothing. "

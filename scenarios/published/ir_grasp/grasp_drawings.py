@@ -116,8 +116,8 @@ def draw_cases(folder: Path) -> Figure:
         last.plot([], [], color=_ARROW, lw=2, label="action")
         last.legend(loc="center")
     caption = (
-        "The seven cases of [Luberto] fig. 9 and the action that the controller takes of each, in scenes in which "
-        "the sensors read so: solid beams meet the object within 65 mm; a finger sees up to 60 mm by the curve. The "
+        "The seven cases of [Luberto] fig. 9 and the action that the controller takes in each, in scenes in which "
+        "the sensors read so. Solid beams meet the object within 65 mm; a finger sees up to 60 mm by the curve. The "
         "figure's own actions are not described in the text; these follow from the planar hand. Where one would undo "
         "the last, a second one takes its place."
     )

@@ -17,6 +17,7 @@ from handover.plants.ir_grasp.objects import SOLIDS
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.statistics import success_interval
 from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.experiment.display_unit import counted
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.ir_grasp.evaluation import IN_COST
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
@@ -159,7 +160,7 @@ def judge_descents(descents: Sequence[Descent], perturbed: bool) -> Claim:
         interval.high < FEW,
         f"the interval (Clopper-Pearson) of how often it does not fall lies below {format_share(FEW)}, of the runs "
         "that made a step and saw the object with thumb and ring at their end",
-        f"Left out are {len(descents) - n} of {len(descents)} runs.",
+        f"Left out are {len(descents) - n} of {counted(len(descents), 'run')}.",
         runs=(n, min_trials_for(FEW)),
         interval=interval,
     )
@@ -191,7 +192,7 @@ def _draw_descents(runs: IrTableRuns, perturbed: bool, folders: Path, folder: Pa
             curves = [1e3 * d.distance[:, i] for d in descents]
             fingers += _curves(curves, FINGER_COLOURS[i], finger, last, 1e3 * printed[finger])
         norm = 1e3 * math.hypot(printed["thumb"], printed["ring"])
-        number = "1 run" if len(descents) == 1 else f"{len(descents)} runs"
+        number = counted(len(descents), "run")
         axes = {"xlabel": "Gauss-Newton step", "xlim": (-0.4, last + 1.2)}
         key = [
             Mark(label="a run", style={"lw": 0.6}),

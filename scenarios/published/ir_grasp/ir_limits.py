@@ -12,6 +12,7 @@ import numpy as np
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.statistics import LEVEL, success_interval, time_interval
 from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.experiment.display_unit import counted
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import COLOURS
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
@@ -186,7 +187,7 @@ def _no_worse(sentence: str, printed: str, held: Sequence[float], started: Seque
         interval.high < FEW,
         f"what is lost has an interval below {format_share(FEW)} of the scenes: of each, the share of levels that was "
         "not held, less 1 if it was not held undisturbed",
-        f"The mean of {n} scenes is {format_share(float(lost.mean()))}, by {interval.method} over scenes up to "
+        f"The mean of {counted(n, 'scene')} is {format_share(float(lost.mean()))}, by {interval.method} over scenes up to "
         f"{format_share(interval.high)}.",
         runs=(n, min_trials_for(FEW)),
     )
@@ -273,7 +274,7 @@ def _table_of_worth(runs: LimitRuns) -> ComparisonTable:
         "these runs themselves, which favours it."
     )
     if runs.unfinished:
-        note += f" {runs.unfinished} runs did not come to their end, and count as failures."
+        note += f" Counted as failures: {counted(runs.unfinished, 'run')} that did not come to an end."
     return table_of(f"What looking is worth{_unpushed(runs)}", [_row_of_worth(c) for c in compared], note)
 
 

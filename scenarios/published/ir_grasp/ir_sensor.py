@@ -11,6 +11,7 @@ from handover.controllers.ir_grasp.parameters import Params as ReflexParams
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.experiment.display_unit import counted
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import COLOURS
 from handover.scenarios.ir_grasp.ir_sensor import AT, Finger, IrSensor
@@ -118,7 +119,7 @@ class IrSensorCurve(PublishedExperiment):
                 "Medians over runs, by least squares in distance over 4 to 60 mm. Two exponentials are hard to "
                 "separate: constants differ more than curves do. The last column: from the controller's curve, at "
                 "readings of 100 to 3000."
-                + (f" {unusable} runs failed, or touched the box, and do not count." if unusable else ""),
+                + (f" Not counted: {counted(unusable, 'run')} that failed, or touched the box." if unusable else ""),
             ),
             table_of(
                 "Sensors whose constants are off",

@@ -22,6 +22,7 @@ from handover.scenarios.campaign.statistics import (
     two_proportions,
 )
 from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.experiment.display_unit import counted
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import COLOURS
@@ -218,7 +219,7 @@ class IrTableRuns:
     def __init__(self, table: CampaignTable) -> None:
         self._runs = IrTable().runs(table)
         left = len(table.rows) - len(self._runs)
-        self.unfinished = f" {left} runs did not come to their end and do not count." if left else ""
+        self.unfinished = f" Not counted: {counted(left, 'run')} that did not come to an end." if left else ""
 
     def of(self, arm: Arm, perturbed: bool, things: Sequence[Thing] = tuple(SOLIDS)) -> Runs:
         """Return the runs of an arm in a pose that came to their end."""
@@ -449,7 +450,7 @@ def _nearer_than_measured(runs: IrTableRuns, perturbed: bool) -> str:
     true = [[row.get(f"true_distance_{finger}") for finger in _IN_COST] for row in found]
     nearer = sum(any(d is not None and d < nearest for d in distances) for distances in true)
     return (
-        f"In {nearer} of {len(found)} runs that ended by the threshold, thumb or ring is truly nearer than "
+        f"In {nearer} of {counted(len(found), 'run')} that ended by the threshold, thumb or ring is truly nearer than "
         f"{1000 * nearest:g} mm, where readings fall again."
     )
 

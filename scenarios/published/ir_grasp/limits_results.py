@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from handover.scenarios.campaign.statistics import LEVEL, holm, sign_flip_test
+from handover.scenarios.experiment.display_unit import counted
 from handover.scenarios.published.ir_grasp.limits_axes import AXES, Axis, LimitArm, settings_of
 from handover.scenarios.published.runs import Count, Row, Runs, is_done, plain
 
@@ -162,7 +163,8 @@ def sentence_of_worth(compared: Sequence[Comparison]) -> str:
         else f"Looking is nowhere shown to hold {round(100 * WORTH)} points more than the best way without",
         *([f"less, by as much, where it is {_listed(costs)}"] if costs else []),
     ]
-    rest = f" On {len(other)} of {len(compared)} axes neither is shown: {_listed(other)}." if other else ""
+    of = counted(len(compared), "axis", "axes")
+    rest = f" On {len(other)} of {of} neither is shown: {_listed(other)}." if other else ""
     return f"{'; '.join(parts)}.{rest}"
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.experiment.display_unit import counted
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import COLOURS
@@ -122,8 +123,8 @@ class Vsl1(PublishedExperiment):
         """Return mean errors cell by cell, path by path, and errors near the base and far from it."""
         runs = Vsl1Runs(table)
         note = (
-            "Mean distance of the tip from the desired points, by the tracker, and of the place where encoders and "
-            "rigid links put it (servos: the runs of all links); ± the standard deviation between runs. "
+            "Mean distance of the tip from the desired points, by the tracker. Servos: the same of where encoders and "
+            "rigid links put the tip, over the runs of all links. ± is the standard deviation between runs. "
             f"{_NOT_PRINTED}{runs.unfinished}"
         )
 
@@ -195,7 +196,7 @@ class Vsl1Runs:
         self.soft = [name for name, links in SOFT.items() if len(tried.matching(links))]
         self.arms = [RIGID, *self.soft]
         left = len(tried) - len(self.done)
-        self.unfinished = f" {left} runs did not complete the path and do not count." if left else ""
+        self.unfinished = f" Not counted: {counted(left, 'run')} that did not complete the path." if left else ""
 
     def of(self, metric: str, path: str, load: str, arm: str) -> Floats:
         """Return a metric of a cell's runs that completed the path, however far off it they were."""

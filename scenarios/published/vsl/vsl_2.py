@@ -15,6 +15,7 @@ from handover.controllers.vsl.model_text import InvalidModel, read_model
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.experiment.display_unit import counted
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import COLOURS
@@ -120,7 +121,7 @@ class Vsl2(PublishedExperiment):
     The quick plan has each case once by rigid kinematics and by polynomials, on the arm that was learned from and on
     another, and on two rigid arms.
 
-    The beam has the law of bending and the masses of the arm that it is tried on (an inverse crime): its errors are the
+    The beam has the law of bending and the masses of the arm that it is tried on (an inverse crime). Its errors are the
     least that such a correction could reach, and say nothing of one on a real arm.
     """
 
@@ -260,7 +261,7 @@ class Vsl2Runs:
         tried = Vsl2().runs(table, keep=lambda _: True)
         self._done = tried.where(has_completed_path)
         left = len(tried) - len(self._done)
-        self.unfinished = f" {left} runs did not complete the path and do not count." if left else ""
+        self.unfinished = f" Not counted: {counted(left, 'run')} that did not complete the path." if left else ""
         first = next(iter(CASES))
         self.arms = [a for a in OTHERS if any(len(self.of(first, m, a)) for m in (MODEL_BASED, *LEARNED))]
         self.learned = [m for m in LEARNED if any(len(self.of(case, m)) for case in CASES)]

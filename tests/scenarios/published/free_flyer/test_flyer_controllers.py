@@ -66,7 +66,7 @@ def test_every_claim_is_judged_both_ways(wording: Wording):
     *_, disturbed = FlyerControllers().tables(late)
     assert disturbed.rows[0][:3] == [DISTURBANCES[0].label, "rigid", "did not end"]
     assert disturbed.rows[0][3].startswith("2/2: 1000 mm")
-    assert sum("did not come to their end" in c.reason for c in verdicts(late).values()) == 1
+    assert sum("did not come to an end" in c.reason for c in verdicts(late).values()) == 1
 
 
 def test_no_controller_of_the_plan_is_told_of_a_delay_that_it_would_reject():

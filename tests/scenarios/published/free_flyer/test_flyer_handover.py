@@ -131,7 +131,7 @@ def test_runs_that_did_not_come_to_their_end_are_failures():
         found = [c for text, c in claims.items() if words in text]
         assert found
         assert {c.verdict for c in found} == {Verdict.NOT_REPRODUCED}
-        assert all("did not come to their end" in c.reason for c in found)
+        assert all("did not come to an end" in c.reason for c in found)
 
 
 def test_what_is_chosen_here_is_not_said_to_be_reproduced():

@@ -114,7 +114,7 @@ def test_runs_that_did_not_come_to_their_end_are_failures():
     failed = [row | {"status": "failed", "success": None, "decided_by": None} for row in (first, second)]
     claim = verdicts(made_table([*failed, *rest]))["With the assumed noise alone every handover succeeds"]
     assert (claim.verdict, claim.measured) == (Verdict.NOT_REPRODUCED, "10/12 (83 %)")
-    assert "2 of 12 runs did not come to their end" in claim.reason
+    assert "2 of 12 runs, which did not come to an end" in claim.reason
 
 
 def test_a_robot_that_acted_alone_and_had_luck_is_no_success_and_no_figure():

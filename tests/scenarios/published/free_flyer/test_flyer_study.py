@@ -151,4 +151,4 @@ def test_trials_that_did_not_come_to_their_end_are_failures():
     rows = [row | {"success": True} | (failed if k < 20 else {}) for k, row in enumerate(table_of().rows)]
     claim = verdicts(made_table(rows))["Handovers that succeed: robot to human, rigid"]
     assert claim.measured == "180/200 (90 %)"
-    assert "20 of 200 runs did not come to their end" in claim.reason
+    assert "20 of 200 runs, which did not come to an end" in claim.reason

@@ -93,7 +93,7 @@ def test_the_published_figures_reproduce_themselves():
 
 def test_one_ball_that_was_not_taken_is_one_too_many_and_a_crash_counts_neither_way():
     claim = judged(table_of(times(a04=[*PUBLISHED[0.4][:7], None])), "Every handover")
-    assert (claim.measured, claim.verdict) == ("23 of 24", Verdict.NOT_REPRODUCED)
+    assert (claim.measured, claim.verdict) == ("23/24 (96 %)", Verdict.NOT_REPRODUCED)
     assert claim.interval is not None
     assert claim.interval[1] < 1.0
     assert claim.reason.endswith("p = 1.")
@@ -101,8 +101,14 @@ def test_one_ball_that_was_not_taken_is_one_too_many_and_a_crash_counts_neither_
     assert judged(made_table(rows), "begins to close").verdict is Verdict.REPRODUCED
     rows[0] |= {"status": "failed", "success": None, "arm_time": None}
     claim = judged(made_table(rows), "Every handover")
-    assert claim.measured == "0 of 23"
-    assert "1 runs that did not come to their end" in claim.reason
+    assert claim.measured == "0/23 (0 %)"
+    assert "1 run that did not come to an end" in claim.reason
+
+
+def test_fewer_runs_than_four_show_nothing_of_every_run():
+    rows = table_of(PUBLISHED).rows
+    for n, verdict in ((1, Verdict.NOT_COMPARABLE), (3, Verdict.NOT_COMPARABLE), (4, Verdict.REPRODUCED)):
+        assert judged(made_table(rows[:n]), "Every handover").verdict is verdict
 
 
 @pytest.mark.parametrize(

@@ -162,7 +162,7 @@ def test_a_distance_beyond_the_range_is_told_as_not_seen_and_runs_that_did_not_c
     )
     assert IrTableRuns(made).count(REFLEX, False) == (75, 75)
     first, *others = IrTable().tables(made)
-    assert "40 runs did not come to their end" in first.note
+    assert "40 runs that did not come to an end" in first.note
     table = next(t for t in others if t.title.startswith("Table II, nominal"))
     told = {dict(zip(table.header, row, strict=True))["index, ours"] for row in table.rows}
     assert told == {"40.0 (40.0 to 40.0); not seen in 5", "not seen in 30"}

@@ -82,7 +82,7 @@ def test_without_any_run_that_completed_the_path_there_are_no_verdicts_and_no_fa
 ):
     table = table_of(**same)
     assert {c.verdict for c in Vsl1().claims(table)} == {Verdict.NOT_COMPARABLE}
-    assert "375 runs did not complete the path" in Vsl1().tables(table)[0].note
+    assert "375 runs that did not complete the path" in Vsl1().tables(table)[0].note
     assert not Vsl1().draw(table, tmp_path, tmp_path)
 
 
