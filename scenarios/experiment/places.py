@@ -16,6 +16,8 @@ from handover.cosim.system.system import PlacedUnit, PortName, System
 from handover.fmus.catalog import Entry, find_unit, import_class
 
 _CAUSALITIES = (Causality.INPUT, Causality.OUTPUT, Causality.PARAMETER)
+_MOST_NAMED = 10
+"""Ports of a kind that a note names; of more it says how many there are."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,11 +28,13 @@ class Place:
         required: inputs, outputs and parameters without which the scenario cannot be, each with what to know of it
             besides its description by the scenario's own unit, such as its frame; "" where that says it all.
         optional: likewise those that the scenario wires, sets or reads where the unit has them.
+        advised: optional outputs without which no run can succeed; a start for a unit of one's own has them, too.
         remarks: sentences on the whole: frames, signs, what is left out without the optional ones.
     """
 
     required: Mapping[str, str] = field(default_factory=dict[str, str])
     optional: Mapping[str, str] = field(default_factory=dict[str, str])
+    advised: Sequence[str] = ()
     remarks: Sequence[str] = ()
 
 
@@ -165,7 +169,7 @@ class _Fitting:
 
     def _note(self, absent: Mapping[Causality, Sequence[str]]) -> None:
         """Note what is left out, and which of the unit's inputs nothing feeds: their names may be misspelled."""
-        if parts := [_without(causality, names) for causality, names in absent.items() if names]:
+        if parts := [_without(causality, names, self._own.name) for causality, names in absent.items() if names]:
             self._system.notes.append(f"{self._what} has {'; '.join(parts)}")
         fed = {*self._system.fed_inputs(self._unit.name), *self._unit.start}
         missing = [n for names in absent.values() for n in names]
@@ -183,7 +187,7 @@ def signature(v: Variable) -> str:
     return f"{v.kind.value}{shape}{unit}"
 
 
-def _without(causality: Causality, names: Sequence[str]) -> str:
+def _without(causality: Causality, names: Sequence[str], own: str) -> str:
     """Return which ports a unit does not have, and what the scenario does without them."""
     many = len(names) > 1
     what = {
@@ -191,7 +195,10 @@ def _without(causality: Causality, names: Sequence[str]) -> str:
         Causality.OUTPUT: f"what the scenario would make of {'them' if many else 'it'} is left out",
         Causality.PARAMETER: f"what the scenario would set {'them' if many else 'it'} to is not used",
     }
-    return f"no {causality.value}{'s' if many else ''} {', '.join(names)}: {what[causality]}"
+    named = ", ".join(names)
+    if len(names) > _MOST_NAMED:
+        named = f"of {own}'s {len(names)}, which `handover list {own}` shows"
+    return f"no {causality.value}{'s' if many else ''} {named}: {what[causality]}"
 
 
 def _difference(found: FmuPort, wanted: Variable) -> str | None:

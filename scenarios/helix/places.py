@@ -78,8 +78,8 @@ PLACES = {
     "servo": Place(
         required={
             "dl_t": "three tendons of each segment, base segment first, at the angles 0, 120 and 240 degrees from x of "
-            "B towards y of B; a shorter tendon (a negative change) bends its segment towards its angle, so that at "
-            "120 degrees towards +y of B, which is -y of W; all three by as much change the segment's length",
+            "B towards y of B. A shorter tendon (a negative change) bends its segment towards its angle: at 120 "
+            "degrees towards +y of B, which is -y of W. All three together change the segment's length",
         },
         optional={
             "closure": "the person lets go once the gripper has closed around the ball",
@@ -104,6 +104,7 @@ PLACES = {
             "seed": "follows from the run's seed",
             **_TUNED,
         },
+        advised=("closure",),
         remarks=(
             _BASE,
             "Calibrated, the arm hangs straight with segments of 0.12, 0.24 and 0.24 m, tendons 0.035 m from its axis; "
@@ -182,8 +183,8 @@ REFLEX_PLACES = {
     "camera": replace(PLACES["camera"], optional={**PLACES["camera"].optional, **_NEAR}),
     "fingers": Place(
         required={
-            "ticks": "of 12-bit converters; the sensors that look across to the gripper's axis, of the fingers at 60, "
-            "180 and 300 degrees from x of G towards y, then those that look ahead"
+            "ticks": "of 12-bit converters. Those that look across look to the gripper's axis. The fingers are at 60, "
+            "180 and 300 degrees from x of G towards y"
         },
         optional=_FINGERS,
         remarks=(_BASE,),

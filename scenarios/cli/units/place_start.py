@@ -84,9 +84,9 @@ def test_it_takes_its_place():
 def start_for(place: str, class_name: str, module: str) -> dict[str, str]:
     """Return the texts of a module and of its test, by file name, for a place such as `helix_handover:servo`.
 
-    It has the inputs of the place, and the outputs and parameters that it must have, declared as the scenario's own
-    unit declares them; what else is known of each stands above it. Outputs depend on inputs as those of that unit do,
-    so that no algebraic loop arises where it has none, and stay where that unit's begin.
+    It has the inputs of the place, and the outputs and parameters that it must or should have, declared as the
+    scenario's own unit declares them. What else is known of each stands above it. Outputs depend on inputs as those of
+    that unit do, so that no algebraic loop arises where it has none, and stay where that unit's begin.
 
     Raises:
         UsageError: there is no such scenario or place, it does not say what a unit needs, or it needs an output of a
@@ -102,8 +102,13 @@ def start_for(place: str, class_name: str, module: str) -> dict[str, str]:
         raise UsageError(f"{scenario} does not say what a unit in the place {name} needs; it does of: {places}")
     ports = checked_ports_of_place(experiment, name, own)
     block = import_class(own.block)
+    advised = experiment.places[name].advised
     wanted = {
-        c: [p for p in ports if p.declared.causality is c and (p.is_required or c is Causality.INPUT)]
+        c: [
+            p
+            for p in ports
+            if p.declared.causality is c and (p.is_required or c is Causality.INPUT or p.declared.name in advised)
+        ]
         for c in (Causality.PARAMETER, Causality.INPUT, Causality.OUTPUT)
     }
     first = _first_outputs(block)

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import pytest
 from support.rewritten_archive import described_otherwise
 
+from handover.cosim.blocks.variable import Causality
 from handover.cosim.master.stepper_factory import StepperFactory
 from handover.cosim.stepping.options import MasterOptions
 from handover.cosim.system.system import System
@@ -48,6 +49,7 @@ def test_a_place_is_declared_for_each_unit_with_ports_that_its_own_unit_has(scen
     assert set(scenario.places) == set(scenario.units)
     for name, place in scenario.places.items():
         assert not set(place.required) & set(place.optional)
+        assert set(place.advised) <= set(place.optional)
         ports = ports_of_place(place, find_unit(scenario.units[name]))
         assert all(port.sentence for port in ports)
 
@@ -63,6 +65,18 @@ def test_all_that_is_wired_is_declared_and_none_is_left_out_of_its_own_units(
         place = scenario.places[name]
         assert {*wired, *unit.start} <= {*place.required, *place.optional}, name
         assert {*fitted.units[name].start} == {*unit.start}
+
+
+def test_a_note_names_a_few_ports_that_a_unit_lacks_and_counts_many():
+    scenario = SCENARIOS["flyer_arm_impedance"]
+    fmus = {unit: cached(name, 3) for unit, name in scenario.units.items()}
+    system = scenario().wire(scenario.parameters_type(), 0, {**fmus, "impedance": fmus["push"]}.__getitem__)
+    (note,) = (n for n in system.notes if n.startswith("unit impedance (Push) has"))
+    ports = ports_of_place(scenario.places["impedance"], find_unit("ArmImpedanceController"))
+    absent = {c: [p.declared.name for p in ports if p.declared.causality is c and not p.is_required] for c in Causality}
+    assert f"no outputs {', '.join(absent[Causality.OUTPUT])}: " in note
+    many = len(absent[Causality.PARAMETER])
+    assert f"no parameters of ArmImpedanceController's {many}, which `handover list ArmImpedanceController` " in note
 
 
 def test_every_scenario_runs_as_a_compiled_plan(systems: Systems):
