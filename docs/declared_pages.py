@@ -9,6 +9,7 @@ import enum
 import inspect
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -82,14 +83,14 @@ def write(folder: Path, runs: Mapping[str, GalleryRun], experiments: Mapping[str
 def unit(entry: Entry) -> dict[str, Any]:
     """Return what the page of a unit shows."""
     d = describe(import_class(entry.block))
-    ports = (("Inputs", d.inputs), ("Outputs", d.outputs))
+    ports = (("Inputs", d.inputs, "start"), ("Outputs", d.outputs, "unit"))
     return {
         "declared": d,
         "doc": parse(with_latex(entry.name, d.doc)),
         "origin": d.module_doc.partition("\n\n")[0],
         "papers": cited("\n".join((d.module_doc, d.doc, *(v.description for v in d.variables)))),
         "parameters": _rows(entry.name, d.parameters),
-        "ports": [(title, [row(v, Form.FMI3) for v in variables]) for title, variables in ports],
+        "ports": [(title, [row(v, Form.FMI3) for v in variables], start) for title, variables, start in ports],
         "feedthrough": _feedthrough(d),
         "enumerations": [(e.__name__, items(e)) for e in _enumerations(d.variables)],
         "scenarios": [name for name, kind in SCENARIOS.items() if entry.name in kind.units.values()],
@@ -178,7 +179,14 @@ def _rows(of: str, variables: Sequence[Variable]) -> list[tuple[Row, str]]:
     origins = _WITHOUT_ORIGIN | {v.name: str(v.origin) for v in variables if v.origin}
     if lacking := [f"origin of {v.name} of {of}" for v in variables if v.name not in origins]:
         raise Undocumented(lacking)
-    return [(row(v, Form.FMI3), origins[v.name]) for v in variables]
+    return [(_without_status(row(v, Form.FMI3), origins[v.name]), origins[v.name]) for v in variables]
+
+
+def _without_status(shown: Row, origin: str) -> Row:
+    """Return a row whose description does not repeat that the value is assumed, if its origin says so."""
+    if not origin.startswith("assumed"):
+        return shown
+    return replace(shown, description=shown.description.removesuffix(" (assumed)"))
 
 
 def _paragraph(command: click.Command, heading: str) -> str:

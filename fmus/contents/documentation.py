@@ -131,6 +131,8 @@ def _start(v: Variable) -> str:
         rows = np.atleast_2d(v.start)
         if rows.size > 9:
             return f"{rows.flat[0]:.6g} …"
+        if len(rows) > 1 and rows.shape[0] == rows.shape[1] and np.array_equal(rows, np.diag(np.diag(rows))):
+            return f"diag({', '.join(f'{value:.6g}' for value in np.diag(rows))})"
         return "; ".join(", ".join(f"{value:.6g}" for value in row) for row in rows)
     return v.start.name if v.enumeration is not None else f"{v.start:.6g}" if v.kind is Kind.REAL else str(v.start)
 
