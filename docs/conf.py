@@ -16,6 +16,7 @@ from sphinx.errors import ExtensionError
 
 sys.path.insert(0, str(Path(__file__).parent))
 from equations import show_block, show_inline
+from sentences import MOST_WORDS, long_sentences
 
 project = "handover-cosim"
 author = "The handover-cosim authors"
@@ -111,10 +112,24 @@ def check_links(app: Sphinx, failure: Exception | None) -> None:
         raise ExtensionError(f"files that are linked and are not there: {'; '.join(broken)}")
 
 
+def check_sentences(app: Sphinx, failure: Exception | None) -> None:
+    """Look for sentences of built pages that are too long.
+
+    Raises:
+        ExtensionError: there are some; all are named with their pages.
+    """
+    folder = Path(app.outdir)
+    pages = [page for page in folder.rglob("*.html") if "gallery" not in page.relative_to(folder).parts]
+    long = [f"{p.relative_to(folder)}: {s}" for p in pages for s in long_sentences(p.read_text("utf-8"))]
+    if failure is None and long:
+        raise ExtensionError(f"sentences of more than {MOST_WORDS} words:\n" + "\n".join(long))
+
+
 def setup(app: Sphinx) -> None:
     """Show examples in docstrings as code, and equations without a script from the network."""
     app.add_html_math_renderer("mathml", (show_inline, None), (show_block, None))
     app.connect("build-finished", check_links)
+    app.connect("build-finished", check_sentences)
     app.connect("doctree-resolved", keep_units)
     app.connect("sphinx-click-process-description", set_columns)
     app.connect("sphinx-click-process-options", set_defaults)

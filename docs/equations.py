@@ -49,5 +49,6 @@ def _write(translator: Any, node: Any, display: str) -> None:
     from docutils.nodes import SkipNode
     from latex2mathml.converter import convert
 
-    translator.body.append(convert(node.astext(), display=display))
+    equation = convert(node.astext(), display=display)
+    translator.body.append(f'<div class="equation">{equation}</div>' if display == "block" else equation)
     raise SkipNode

@@ -217,12 +217,14 @@ def gallery_experiment(name: str, files: Path) -> GalleryExperiment:
 
 
 def check_tables(name: str, tables: Iterable[ComparisonTable]) -> None:
-    """Raise an error if an experiment's table has no value beside the names of its rows.
+    """Raise an error if an experiment's table has rows but no value beside their names.
+
+    A table without rows lists what did not occur, such as failures: its page says so.
 
     Raises:
         EmptyTable: it names the table, and where the runs are chosen.
     """
-    if empty := [table.title for table in tables if not any(any(row[1:]) for row in table.rows)]:
+    if empty := [table.title for table in tables if table.rows and not any(any(row[1:]) for row in table.rows)]:
         raise EmptyTable(f"{name}: no value in the table {'; '.join(empty)}: choose other points in _POINTS")
 
 

@@ -44,6 +44,8 @@ def main() -> None:
     pictures.check()
     runs = {name: gallery_run(name, BUILD / "files") for name in SCENARIOS}
     declared_pages.write(DOCS, runs, {name: gallery_experiment(name, BUILD / "files") for name in EXPERIMENTS})
+    for page in ("commands", "python"):
+        (DOCS / "reference" / f"{page}.md").touch()  # Sphinx makes them of the product
     stamp.write_text(key)
 
 

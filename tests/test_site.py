@@ -154,6 +154,14 @@ def test_each_equation_is_mathml_that_browsers_lay_out():
         assert not list(mathml.iter("{*}mspace")) or r"\\" not in equation, equation
 
 
+def test_a_sentence_that_is_too_long_is_found_where_code_equations_and_numbered_lists_do_not_count():
+    sentences, words = maker("sentences"), " ".join(["word"] * 39)
+    codes = 60 * "<code class='x'><span>f_G</span></code>, " + "<math><mi>x</mi></math>"
+    short = f"<p>{codes} {words}. Another {words}. Why: {', '.join(f'{i} reason of some kind' for i in range(20))}.</p>"
+    assert sentences.long_sentences(f"<p>{words} {words}</p><article>{short}</article>") == []
+    assert len(sentences.long_sentences(f"<article>{short}<figcaption>It is a {words}</figcaption></article>")) == 1
+
+
 def test_a_sentence_says_how_many_runs_there_are():
     """In the number's grammar, and in thousands."""
     made = maker("gallery").GalleryExperiment
@@ -165,6 +173,15 @@ def test_every_published_experiment_is_run_for_the_gallery():
     points = maker("gallery")._POINTS
     assert points.keys() == EXPERIMENTS.keys()
     assert all(max(points[name]) < len(EXPERIMENTS[name]().plan(quick=False).points) for name in points)
+
+
+def test_a_table_of_the_gallery_without_a_value_is_named():
+    gallery = maker("gallery")
+    sound = [[], [("a", "", "1"), ("b", "", "")]]
+    tables = [SimpleNamespace(title=f"table {len(rows)}", rows=rows) for rows in (*sound, [("a", "", "")])]
+    gallery.check_tables("ir-table", tables[:2])
+    with pytest.raises(gallery.EmptyTable, match="ir-table: no value in the table table 1"):
+        gallery.check_tables("ir-table", tables)
 
 
 @pytest.fixture
@@ -252,12 +269,13 @@ kernelspec:
         ("[A page](nowhere.md) and [a heading](page.md#nobody) that are not.", "1 / 2", ["nowhere.md", "nobody"]),
         ('<a href="page.html">One</a>, <img src="nothing.png">', "1 / 2", ["page.html: nothing.png"]),
         ("A cell that fails.", "1 / 0", ["page.md", "ExecutionError"]),
+        (f"{'Word ' * 41}.", "1 / 2", ["page.html: Word Word"]),
     ],
-    ids=["sound", "links", "file", "cell"],
+    ids=["sound", "links", "file", "cell", "sentence"],
 )
 def test_the_build_stops_at_a_link_or_a_cell_that_fails(text: str, code: str, named: list[str], tmp_path: Path):
     """By the site's own settings and the command of `make docs`, on a site of one page that this Python executes."""
-    for name in ("conf.py", "equations.py", "equations.toml"):
+    for name in ("conf.py", "equations.py", "equations.toml", "sentences.py"):
         shutil.copyfile(DOCS / name, tmp_path / name)
     shutil.copytree(DOCS / "static", tmp_path / "static")
     (tmp_path / "build" / "files").mkdir(parents=True)

@@ -61,27 +61,29 @@ class HandoverStateMachine(SampledController[Inputs, Outputs]):
     - Hold: ACTIVATE_IMPEDANCE, to the end.
 
     Conditions of this implementation besides: impedance control begins only at rest near the handover place
-    (gate_error, gate_speed), and the light only once the gripper is at rest again under it and within `tolerance`,
-    after a failure too, since a transient trips the threshold with no person there. The threshold counts from the light
-    on, once the speed was below it. Unless `gated`, none of this holds, as the thesis names no such condition:
-    impedance control begins within gate_error of the place, at any speed, the light follows at once, and the threshold
-    counts from its end. The gripper's velocity is v + w x R p_BG. GIVEN_UP, holding the pose and not moving the
-    gripper, is entered after `patience` in a phase, after `attempts` failures, and when an object that was fetched is
-    not between the fingers, which have not released it: from MOVE_TO_HANDOVER on that is a failed delivery, except
-    in CHECK_VELOCITY of a gradual gripper, which takes it for a release.
+    (gate_error, gate_speed). The light goes on only once the gripper is at rest again under it and within `tolerance`.
+    That holds after a failure, too, since a transient trips the threshold with no person there. The threshold counts
+    from the light on, once the speed was below it. Unless `gated`, none of this applies, as the thesis names no such
+    condition. Impedance control then begins within gate_error of the place, at any speed, the light follows at once,
+    and the threshold counts from its end. The gripper's velocity is v + w x R p_BG.
+
+    GIVEN_UP holds the pose and does not move the gripper. It is entered after `patience` in a phase and after
+    `attempts` failures. It is entered, too, when an object that was fetched is not between the fingers, which have not
+    released it. From MOVE_TO_HANDOVER on that is a failed delivery, except in CHECK_VELOCITY of a gradual gripper,
+    which takes it for a release.
 
     Where it is to `verify`, which the thesis does not, RELEASE_OBJECT lasts until the fingers have opened by
     free_angle, and VERIFY_RELEASE follows: verify_wait later they close once more. In both the robot coasts, without
     control, so that an object that floats stays between the fingers. Where they hold something, the person has not
-    taken the object: the delivery has failed, and it begins again from MOVE_TO_HANDOVER, as a collaborative reception
-    does then, since pose control brings back a robot that turns fast, where impedance control within limits of thrust
-    does not. Where they hold nothing, the object is the person's or has floated away: by its navigation and its
-    gripper's angle the robot cannot tell the two apart, and takes it for delivered.
+    taken the object. The delivery has failed, and begins again from MOVE_TO_HANDOVER, as a collaborative reception does
+    then. Pose control brings back a robot that turns fast, where impedance control within limits of thrust does not.
+    Where they hold nothing, the object is the person's or has floated away. By its navigation and its gripper's angle
+    the robot cannot tell the two apart, and takes it for delivered.
 
     Where it is `gradual`, CHECK_VELOCITY moves the fingers, by how the gripper's speed v lies between a part of the
     threshold and the threshold a itself: s = (v / a - gradual_share) / (1 - gradual_share), from 0 to 1. While it gives
-    and is pulled (`PullMonitor`), the closure is 1 - s, and the object is released once the fingers have opened by
-    free_angle from what they held, or hold nothing: where the pull ends before that, they close again. While it
+    and is pulled (`PullMonitor`), the closure is 1 - s. The object is released once the fingers have opened by
+    free_angle from what they held, or hold nothing. Where the pull ends before that, they close again. While it
     receives, the closure is the largest s since v was last below that part, and the threshold decides as ever.
 
     Raises:

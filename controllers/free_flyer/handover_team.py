@@ -182,16 +182,16 @@ class HandoverTeam(SampledController[Inputs, Outputs]):
     """Runs a handover by two robots that hold one object, by the rules of `HandoverStateMachine`.
 
     - Together: one machine for both, whose gripper is the middle between theirs. Its goals are those of the middle,
-      which each robot follows at its place beside it. A transition that needs rest in place needs it of each robot, and
-      one that needs a gripper that holds something, of both: so both release in the same step, or neither, and after a
-      reception of one alone both open. What has been released is gone only when neither holds it, once both have closed
-      again to verify. A person's pull or push is the middle's velocity, the mean of the grippers'
-      ones: what turns or squeezes the object has none, and releases nothing. GIVEN_UP keeps each gripper where it is.
+      which each robot follows at its place beside it. A transition that needs rest in place needs it of each robot. One
+      that needs a gripper that holds something needs it of both. So both release in the same step, or neither, and
+      after a reception of one alone both open. What has been released is gone only when neither holds it, once both
+      have closed again to verify. A person's pull or push is the middle's velocity, the mean of the grippers'. What
+      turns or squeezes the object has none, and releases nothing. GIVEN_UP keeps each gripper where it is.
     - Not together: a machine for each robot, which knows nothing of the other; for comparison.
 
-    After a release robots yield until they no longer move away from their place: the pull leads both towards the
-    person, and the impedance's spring brakes them with all their thrust, a retreat's trajectory only by the bound of
-    its acceleration, which is lower (both assumed).
+    After a release robots yield until they no longer move away from their place. The pull leads both towards the
+    person. The impedance's spring brakes them with all their thrust, a retreat's trajectory only by the bound of its
+    acceleration, which is lower (both assumed).
 
     Raises:
         InvalidTeamParameters: by the constructor, for goals out of reach of either robot, or thresholds or times that

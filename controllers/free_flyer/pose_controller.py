@@ -126,8 +126,8 @@ class PoseController(GripperController[Inputs, Outputs]):
         F = R_WB^T m (k_P e + k_I sum e T + k_D (v_ref - v) + a_ref)
         M = I_B (k_P_R phi + k_I_R sum phi T + k_D_R (w_ref - w) + dw_ref) + w x I_B w.
 
-    Both are clipped to the propulsion's limits, axis by axis. While F is clipped, its sum is not updated, and likewise
-    that of M (anti-windup). Deactivation resets sums and trajectory.
+    Both are clipped to the propulsion's limits, axis by axis. While F is clipped, its sum is not updated, nor is M's
+    while M is (anti-windup). Deactivation resets sums and trajectory.
 
     At construction the loop near the goal is closed at the period with python-control, with the expected delay and
     lag but without saturation.

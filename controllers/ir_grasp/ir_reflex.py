@@ -1,4 +1,4 @@
-"""Grasp refinement by infrared reflexes: center the hand on an object, close, pull and shake. [Luberto] algorithm 1."""
+"""Grasp refinement by infrared reflexes: centre the hand on an object, close, pull and shake. [Luberto] algorithm 1."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -93,10 +93,10 @@ class IrReflex:
       it is: it may have pushed the object along.
     - PULL, SHAKE, DONE: pull_distance back, then a sine across.
 
-    That is the correction PAPER; FAST comes slowly to the pre-grasp pose and corrects on the move (`Following`):
+    That is the correction PAPER. FAST comes slowly to the pre-grasp pose and corrects on the move (`Following`).
     SEARCH, RECOVER and TRACK follow each other by what is seen, CLOSE goes along with the object, and `steps` are
-    control periods in TRACK. The strategies BLIND, FORWARD and CONTACT (ahead and slowly closing until joints or tendon
-    feel the object between the fingers, or as far as `reach`) do not look.
+    control periods in TRACK. The strategies BLIND, FORWARD and CONTACT do not look. CONTACT goes ahead and closes
+    slowly until joints or tendon feel the object between the fingers, or as far as `reach`.
 
     The residuals are r_i = weight_i (d_i - target) over fingers with a weight: with the printed r_i = d_i the least
     cost is at contact, where the fingers push the object away.

@@ -264,20 +264,21 @@ class HybridKinematics:
     friction acts the same way: commanded to hold still, the arm hunts, at 0.5 bar and 75 g the tip by 4 mm up and down
     in 3 s.
 
-    Beyond the source, and each for itself: friction compensation, see `CurrentFilter`; the closed loop by the tracker,
-    of both methods, or by IMUs of an arm that does not shake, see `TipFeedback`; and the damping of vibrations, see
-    `VibrationDamping`, which without friction compensation only commands ahead. With closed_loop IMUs do nothing: the
-    tracker sees the tip itself.
+    Beyond the source, each can be used alone: friction compensation (`CurrentFilter`), the closed loop (`TipFeedback`)
+    and the damping of vibrations (`VibrationDamping`). The closed loop is by the tracker, of both methods, or by IMUs
+    of an arm that does not shake. Without friction compensation the damping only commands ahead. With closed_loop IMUs
+    do nothing: the tracker sees the tip itself.
 
     `outside` reports that the input of g or h is outside the polytope of its training; see `Domain` for what follows.
     The angle of joint 1, about which the arm is symmetric, decides nothing, and a load only by the currents. It cannot
-    tell that the arm is another: with stiffer links the inputs are the same. `model_mismatch` does, by the tracker in
+    show that the arm is another: with stiffer links the inputs are the same. `model_mismatch` does, by the tracker in
     closed loop or by IMUs, see `ImuTip` and `ModelMonitor`. Without either, or while links shake, it cannot be known,
-    and the last answer stays, false at first. On paths at 0.5 to 1.5 bar with 25 to 100 g the innovation by IMUs is 3.9
-    mm at most on the arm that was learned from, 4.3 mm with links 10 % heavier (error as before), and above the limit
-    of 4 mm in the cases tried in which stiffer or softer links double the error. Friction that doubles it shows as its
-    direction turns alone, and in one of two cases. On the arm that was learned from, while it swings, IMUs may add to
-    the error.
+    and the last answer stays, false at first.
+
+    The innovation by IMUs, on paths at 0.5 to 1.5 bar with 25 to 100 g, is 3.9 mm at most on the arm that was learned
+    from. It is 4.3 mm with links 10 % heavier (error as before). It is above the limit of 4 mm in the cases tried in
+    which stiffer or softer links double the error. Friction that doubles the error shows only while its direction
+    turns, and in one of two cases. On the arm that was learned from, while it swings, IMUs may add to the error.
 
     Raises:
         UnusedParameters: by the constructor, for MODEL_BASED with a model, friction_compensation, vibration_damping, or

@@ -129,8 +129,8 @@ class TrajectoryPlanner:
     """Follows lines and arcs point by point at constant speed. [Gandarias2020] algorithms 1 and 2, corrected.
 
     The first point x_0 is held for the settling time, then until `go`. Each segment has N steps of equal length and
-    time T = length / (N V): during the k-th, the goal is x_{k+1} with q_{k+1} from the inverse kinematics, and the
-    joint velocities are q'_k = J(q_k)^-1 x'_k, so that the joints arrive as the step ends. Between points the goal
+    time T = length / (N V). During the k-th, the goal is x_{k+1} with q_{k+1} from the inverse kinematics. The joint
+    velocities are q'_k = J(q_k)^-1 x'_k, so that the joints come to the goal as the step ends. Between points the goal
     stays. The last point is held. Where T is shorter than the period, points are left out. Joint 1 goes on past half a
     turn instead of all the way back. Pressures are held, too, or change at the times of `pressure_steps`.
 

@@ -14,9 +14,8 @@ from handover.cosim.blocks.units import Metre, Number, Pixel
 
 _AIMED = assumed("point in W that all cameras look at")
 _INTRINSICS = assumed(
-    "f_x, f_y, c_x, c_y of left, right and third camera: focal lengths from the 78 degrees of "
-    "diagonal field of view that the Logitech Brio of sec. 3.2.1 has at 1280x720; principal "
-    "points some px off the middle, as real ones are"
+    "f_x, f_y, c_x, c_y of left, right and third camera. Focal lengths follow from the 78 degrees of diagonal field "
+    "of view of the Logitech Brio of sec. 3.2.1 at 1280x720. Principal points are some px off the middle"
 )
 _DISTORTION = assumed("k_1, k_2, p_1, p_2, k_3 of left, right and third camera; a webcam's size of distortion")
 _BEHIND = assumed(

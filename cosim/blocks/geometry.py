@@ -31,10 +31,10 @@ _UNIT_TOLERANCE = 1e-6  # of a quaternion's length
 _MIN_DEPTH = 0.02  # m; points nearer to the lens, or behind it, are not projected
 
 FRAMES: Final = {
-    "W": "world: right-handed, z up; origin at the middle of the Helix's mount, at the foot of the VSL arm, near the "
-    "place of a free-flyer's handover, on the table of the grasp scene",
-    "B": "base of an arm or a free-flying body; the Helix's has z down, along the hanging arm (R_WB = diag(1, -1, -1)) "
-    "and a free-flyer's has its origin at the centre of mass and its arm along -x",
+    "W": "world: right-handed, z up. Its origin is at the middle of the Helix's mount, at the foot of the VSL arm, "
+    "near the place of a free-flyer's handover, on the table of the grasp scene",
+    "B": "base of an arm or a free-flying body. The Helix's has z down, along the hanging arm (R_WB = diag(1, -1, "
+    "-1)). A free-flyer's has its origin at the centre of mass and its arm along -x",
     "R": "marker ring at the wrist: z along the arm towards the gripper",
     "G": "gripper: the point where an object is held; same axes as R on the Helix, as B on the free-flyer",
     "O": "object that is handed over or grasped: its centre",

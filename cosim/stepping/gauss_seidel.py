@@ -120,7 +120,7 @@ class GaussSeidel:
     Source: C. Gomes et al., Co-simulation: a survey, ACM Comput. Surv. 51 (2018) 49.
     """
 
-    traits: ClassVar = Traits(summary="one unit after another, each from the newest", in_plan=True)
+    traits: ClassVar = Traits(summary="one after another, each from the newest", in_plan=True)
 
     def __init__(
         self,
@@ -167,16 +167,14 @@ class IteratedNewton(GaussSeidel):
     93-113.
     """
 
-    traits: ClassVar = Traits(
-        summary="in a cycle from those at a step's end, by Newton's method with rollback", iterates=True
-    )
+    traits: ClassVar = Traits(summary="as fixed-point, but by Newton's method", iterates=True)
 
 
 class IteratedFixedPoint(GaussSeidel):
     """The same, by relaxed fixed-point iteration, which solves algebraic loops here too."""
 
     traits: ClassVar = Traits(
-        summary="in a cycle from those at a step's end, by fixed-point iteration with rollback",
+        summary="in a cycle from values at its end, by iteration with rollback",
         iterates=True,
         solver=FixedPoint,
     )

@@ -149,8 +149,8 @@ class MasterOptions:
         pace: simulated seconds per second of wall time that a run keeps to; None: as fast as it goes.
         unit_tolerances: relative tolerances that units are given for their own solvers, by name; `all` is all others,
             also where a unit itself is named so. The rest get that of their default experiment, if there is one.
-        strict: whether what is not as it should be with a unit's description is refused even where a run is possible,
-            as where a start value is out of its range or no step is proposed; else the master warns of it.
+        strict: whether a unit's faulty description is refused even where a run is possible, as where a start value is
+            out of its range or no step is proposed. Else the master warns of it.
 
     Raises:
         InvalidOptions: with all invalid values.

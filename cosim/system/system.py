@@ -77,8 +77,8 @@ class System:
     ) -> PlacedUnit:  # fmt: skip
         """Add a unit under a name, with start values of its parameters and inputs.
 
-        `period` is its communication step in seconds, by default the step that its FMU proposes, or else a 500th of its
-        default experiment, to one digit. `sampled` says whether it computes at instants, by default as its FMU
+        `period` is its communication step in seconds. By default it is the step that its FMU proposes, or else a 500th
+        of its default experiment, to one digit. `sampled` says whether it computes at instants, by default as its FMU
         declares: see `FmuDescription`. The returned unit gives port names for `connect`: inputs `unit.u.x`, outputs
         `unit.y.x`.
 
@@ -146,11 +146,12 @@ class System:
         or, where the two do not match, none does, and `check` says why. Of terminals, what was connected is returned.
 
         Of two units, terminals that match are connected first: by their names, then by their kinds. Each other input is
-        fed by the output of the same name, kind and shape whose unit is the same or can be converted, unless it is of a
-        terminal that is refused; what was connected and what was left is returned. An input that is connected by its
-        own name, follows values or comes from outside is left, whether that was said before or is said later; `check`
-        finds an input that several units match, terminals of which several match or that do not match as they should,
-        until their inputs are fed otherwise, and two units of which nothing matches.
+        fed by the output of the same name, kind and shape whose unit is the same or can be converted. Inputs of a
+        terminal that is refused are left. So is an input that is connected by its own name, follows values or comes
+        from outside, whether that was said before or is said later. What was connected and what was left is returned.
+
+        `check` finds inputs that several units match, terminals of which several match or that do not match as they
+        should, until their inputs are fed otherwise. It finds two units of which nothing matches, too.
 
         Raises:
             TypeError: an end is not a port, or not the outputs or inputs of a unit, or units or terminals are connected
@@ -278,7 +279,7 @@ class System:
         """Where several outputs match an input, leave those that are not preferred.
 
         Args:
-            is_preferred: tells of an output whether it is; it is asked only of such outputs.
+            is_preferred: returns whether an output is; it is called only with such outputs.
 
         Returns:
             By input of whose matches none is preferred, so that none of them feeds it, the outputs that match it.
@@ -301,7 +302,7 @@ class System:
         self._unmatched = {units: text for units, text in self._unmatched.items() if unit not in units}
 
     def add_fault(self, fault: str) -> None:
-        """Let `check` raise a fault that whoever wires the system has found, besides those that it finds."""
+        """Let `check` raise a fault that the caller has found, besides those that it finds."""
         self._faults.append(fault)
 
     def tolerate(self, line: str) -> None:

@@ -40,8 +40,8 @@ isolate_option = click.option(
     "--isolate",
     multiple=True,
     metavar="UNIT|foreign|all",
-    help="Let a unit, those that were not built by this project, or all live in processes of their own: one that"
-    " crashes, exits or hangs harms itself alone, and units that do not wait for each other step at the same time."
+    help="Run a unit, those that were not built by this project, or all in processes of their own. One that"
+    " crashes, exits or hangs harms itself alone. Units that do not wait for each other step at the same time."
     " May be given more than once. Units that are named foreign or all themselves are isolated by all only.",
 )
 """For commands that take the other options from elsewhere; `isolated` converts it."""

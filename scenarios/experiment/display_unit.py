@@ -93,4 +93,4 @@ def display_unit(unit: str, values: ArrayLike) -> DisplayUnit:
 
 def unit_symbol(unit: str) -> str:
     """Return an SI unit as it is written, such as "m²"; "" for pure numbers."""
-    return "" if unit == "1" else unit.replace(".", "·").replace("m2", "m²").replace("s2", "s²")
+    return "" if unit == "1" else unit.replace(".", "·").replace("m2", "m²").replace("s2", "s²").replace("s3", "s³")

@@ -211,9 +211,9 @@ def _errors(evaluator: PathEvaluator, folder: Path) -> Figure:
         reach.plot(where, [p.error * 1000 for p in evaluator.points], ".", color=TIP_COLOUR)
         reach.set(xlabel=label, ylabel="error of the tip (mm)", ylim=(0.0, None))
     caption = (
-        "Left: 25th to 75th percentile (box), range, median (line) and mean (dot), of distances of the tip by the "
-        "servos' encoders and rigid links, by the tracker, or by the hybrid model, to the desired points or to the "
-        "true tip. Right: error of the tip over the desired point's place."
+        "Left: distances to the desired points or to the true tip, by the servos' encoders and rigid links, by the "
+        "tracker, or by the hybrid model. 25th to 75th percentile (box), range, median (line) and mean (dot). Right: "
+        "error of the tip over the desired point's place."
     )
     return Figure("errors", caption)
 

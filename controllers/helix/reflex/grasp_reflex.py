@@ -300,10 +300,10 @@ class Outputs:
 class GraspReflex:
     """Stands between vision and servo, and corrects the goal that the servo's Jacobian control goes to.
 
-    `OffsetFilter` has where the ball is from the gripper. The cameras tell it while they see ball and ring; the fingers
-    do, once `sensors_min` of them read something; and the gripper's motion does, as the ring shows it, or else as the
-    motors make it: the tendons' lengths give the commanded state, whose change moves the gripper by J dq, of which it
-    makes down all, and across the part that it made of late (`Response`).
+    `OffsetFilter` estimates where the ball is from the gripper. The cameras measure it while they see ball and ring,
+    the fingers once `sensors_min` of them read something. Between measurements the gripper's own motion changes it, as
+    the ring shows that motion, or else as the motors make it. The tendons' lengths give the commanded state, whose
+    change moves the gripper by J dq. Of that it makes down all, and across the part that it made recently (`Response`).
 
     - While the cameras see both, their measurements go on to the servo, the ball's less what the fingers find the
       cameras to have wrong, beta.

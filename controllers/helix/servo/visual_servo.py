@@ -54,20 +54,20 @@ class Outputs:
 class VisualServo:
     """Algorithm 3: filter, estimate the state (eq. 16), step towards the goal (algorithm 1), close when it is reached.
 
-    The command is updated once in each control_period (give or take its jitter), at the beginning of a step; between,
-    it is held, and with filter_pictures the measurements are filtered in each step. A longer step is one control
-    period. The goal pose has the gripper pointing down, at the ball or (APPROACH) d_grasp_offset above it: X_goal =
-    [p_WG_goal + d_gripper z, p_WG_goal]. The mount, B, is at the origin of W.
+    The command is updated once in each control_period (give or take its jitter), at the beginning of a step. Between
+    updates it is held, and with filter_pictures the measurements are filtered in each step. A longer step is one
+    control period. The goal pose has the gripper pointing down, at the ball or (APPROACH) d_grasp_offset above it:
+    X_goal = [p_WG_goal + d_gripper z, p_WG_goal]. The mount, B, is at the origin of W.
 
     The error is the distance of the gripper from its goal (judge_apart), or the norm |X_goal - X_meas| over all six
     coordinates, in m, where the source prints its square and compares it with metres.
 
     Own additions: see `Params`. The command is held while the ring is not seen, since there is no feedback. Without
-    ring or ball for lost_after the phase is RECOVER: back along the last commands, then a search; a ball without a ring
+    ring or ball for lost_after the phase is RECOVER: back along the last commands, then a search. A ball without a ring
     from the start leads there, too. An error above threshold_retreat in DESCEND (the ball was moved), or above
     threshold_reopen while the gripper closes, leads back to APPROACH. An error that makes no progress leads to
-    GIVEN_UP, which does not close; `verdict` says why: OUT_OF_REACH if no search within the limits brings the model's
-    gripper to its goal, else LIMITS if the command is at one or at windup, else NO_PROGRESS.
+    GIVEN_UP, which does not close; `verdict` gives the reason. It is OUT_OF_REACH if no search within the limits brings
+    the model's gripper to its goal. Else it is LIMITS if the command is at one or at windup, else NO_PROGRESS.
 
     A state optimisation or a loop of algorithm 1 that does not converge is used as far as it came, and signalled by
     `estimate_converged` and `step_converged`.

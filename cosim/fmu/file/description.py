@@ -145,13 +145,13 @@ class FmuPort(Declared):
 class FmuDescription:
     """An FMU's ports and identity.
 
-    `feedthrough` names, by output, the inputs with declared direct feedthrough to it; `presumed_feedthrough` likewise
+    `feedthrough` names, by output, the inputs with declared direct feedthrough to it. `presumed_feedthrough` names them
     where an FMU declares no dependencies, which the standards take as all inputs, or does not list the output at all.
     `initial_feedthrough` and `presumed_initial_feedthrough` are the same in initialization mode (`InitialUnknowns`).
 
     `sampled` says that all outputs are discrete and the step is fixed: such a unit computes at instants, from the
     inputs of the instant. It is stepped without event mode, where it samples by itself, even if it declares a clock for
-    hosts with event mode: so its results are the same in all hosts. That needs ports that can be accessed without a
+    hosts with event mode. So its results are the same in all hosts. That needs ports that can be accessed without a
     clock, so a unit with clocked ports, or with clocks that are not constant, is not sampled in this sense.
 
     `initial` are outputs and local variables whose start values may be given (`initial` is `exact` or `approx`).

@@ -172,9 +172,10 @@ class FreeFlyer:
     Without joints: m v' = R f_B + f_G, L' = R tau_B + (R p_BG) x f_G + tau_G, [Fernandes2020] eqs. (3.18)-(3.24) with
     eq. (4.1). With joints: eq. (3.23) as it is, C of base and arm in the place of B where their momenta are concerned;
     B stays at the base's centre of mass. In place of Euler angles both have a unit quaternion whose sign is continuous.
-    During a step propulsion and a push are held in the robot's frame, what acts on the gripper in the world, and the
-    joints' torques, of at most `torque_max_J`; steps are cut into equal parts of at most `substep`, in which base
-    and joints turn by at most `turn`: a robot at rest needs few of them, and one that tumbles is followed as closely.
+    During a step propulsion and a push are held in the robot's frame, and what acts on the gripper in the world. The
+    joints' torques, of at most `torque_max_J`, are held, too. Steps are cut into equal parts of at most `substep`, in
+    which base and joints turn by at most `turn`. A robot at rest needs few of them, and one that tumbles is followed as
+    closely.
 
     A joint that reaches an end stop, or the tolerance of its drive, stops there without rebound; no momentum is made.
     With `tolerance_J` zero the joints are fixed, as in the thesis; at the first step from `lock_time` on they lock.

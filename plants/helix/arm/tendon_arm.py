@@ -34,8 +34,8 @@ class TendonArm:
 
     The arm hangs from the world's origin. It starts at rest for dl_t = 0, with p_WG at z = -(sum of tendon_length +
     d_gripper). A shortened tendon bends its segment towards its own angle s_k = 0, 120, 240 degrees in the base frame B
-    (z down, R_WB = diag(1, -1, -1)): with l_ik = l_i - d (Dx cos s_k + Dy sin s_k), positive Dx bends towards +x of B
-    and W, positive Dy towards +y of B, which is -y of W.
+    (z down, R_WB = diag(1, -1, -1)). With l_ik = l_i - d (Dx cos s_k + Dy sin s_k), positive Dx bends towards +x of B
+    and W. Positive Dy bends towards +y of B, which is -y of W.
 
     Quaternions are continuous: they start at (0, 1, 0, 0) and do not flip however far the arm bends.
 

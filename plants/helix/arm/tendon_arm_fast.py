@@ -27,9 +27,9 @@ class TendonArmFast:
     """The arm of `TendonArm`: same ports, parameters, discs, elements, tendons and motors, without Exudyn.
 
     The laws are those of `TendonArm`, and so are its frames and signs. Each element's force and moment are K (log - l0)
-    + D (rate), log the logarithm in SE(3) of the motion from one disc to the next, as in Exudyn's connector; the steps
-    are the generalized-alpha method's with the same spectral radius. So both arms differ only by where Newton's method
-    stops, which is micrometres.
+    + D (rate), log the logarithm in SE(3) of the motion from one disc to the next, as in Exudyn's connector. The steps
+    are those of the generalized-alpha method with the same spectral radius. So both arms differ only by where Newton's
+    method stops, which is micrometres.
 
     With Numba its kernels are compiled, once for each version of their sources and of Numba; the machine code stays in
     this project's cache. Without Numba the same kernels run as plain Python, hundreds of times as slow.

@@ -27,12 +27,13 @@ class HandoverPartner:
     """Offers a ball in a hand that trembles, until a closed gripper has it, after [Vervloet2025] sec. 3.5.
 
     The hand is at p_WO_0 plus `HandTremor`, and moves to p_WO_1 in a minimum-jerk course if move_for > 0. The ball lies
-    still in its palm, held with hold_force, until the gripper comes near; from then on ball, hand, and the gripper's
-    fingers and palm are bodies, and what they touch with moves them (`ball_contact`): nothing but contact holds the
+    still in its palm, held with hold_force, until the gripper comes near. From then on ball, hand, and the gripper's
+    fingers and palm are bodies, and what they touch with moves them (`ball_contact`). Nothing but contact holds the
     ball.
 
-    Where the arm hangs nobody can hold a ball: a person whose ball is to go nearer than `room` to the arm's axis waits
-    at that distance, in the same direction, until the gripper is 4 cm higher than its place, and brings it there then.
+    Where the arm hangs nobody can hold a ball. A person whose ball is to go nearer than `room` to the arm's axis waits
+    at that distance, in the same direction. Once the gripper is 4 cm higher than the ball's place, the person brings it
+    there.
 
     If guide_stiffness k > 0, a person leads the gripper to the ball: see `Guidance`; v_WG is from the last two
     positions.
@@ -40,7 +41,7 @@ class HandoverPartner:
     With help_speed > 0 the person brings the ball to G, in a straight line, while a gripper that is near closes.
 
     The person lets go once the gripper has looked closed (grip >= closed_grip) and its fingers have pressed on the ball
-    with felt_grasp in all, both for reaction_time: first thumb and fingers, within release_time, then the hand
+    with felt_grasp in all, both for reaction_time. First thumb and fingers let go, within release_time. Then the hand
     withdraws outwards from the arm's axis and down. Pressed with more than force_max, the person does the same at once.
 
     - HAND: the hand touches the ball, or has within the last 50 ms.
@@ -50,8 +51,8 @@ class HandoverPartner:
       rests on the floor, whatever is in its way.
 
     The gripper's motion in a step is taken as even between the inputs of the step before and those of this one. Forces,
-    ball and hand therefore trail the gripper by one step: with the arm, contacts are calm at 10 ms, where 5 ms gives
-    the same, and throw the ball about at 20 ms; guidance is calm with k from 10 to 50 N/m and c = 2 N s/m.
+    ball and hand therefore trail the gripper by one step. With the arm, contacts are calm at 10 ms, where 5 ms gives
+    the same, and throw the ball about at 20 ms. Guidance is calm with k from 10 to 50 N/m and c = 2 N s/m.
 
     Raises:
         InvalidPartnerParameters: by the constructor, for parameters out of range or that contradict each other.

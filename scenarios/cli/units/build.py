@@ -123,8 +123,8 @@ Environment, when a tool loads the units
 @click.option(
     "--standalone",
     is_flag=True,
-    help="Bring the interpreter and all packages along, for this machine's platform: whoever gets the FMU needs to "
-    "install nothing. Takes a minute a unit, and the package's extra `standalone`.",
+    help="Bring the interpreter and all packages along, for this machine's platform: the FMU then needs "
+    "nothing installed. Takes a minute a unit, and the package's extra `standalone`.",
 )
 @click.option(
     "--include",

@@ -443,8 +443,8 @@ _NOTE_ON_TRANSFERS = (
     "succeeded; in parentheses, where none did, of what all reached. Along x, y, z of W, and in all: how far the "
     "gripper went at most from its place for as long as the robot yielded. Felt after: from the last signal to release "
     "or closing. Taken after: from the first signal until the receiver had the object alone. At the limits: the share "
-    "of the run for which more was commanded than the thrusters give. Published: 40 mm (rigid) and 140 mm (compliant) along z where the "
-    "robot gives, and twice as much of the compliant robot along x where it receives."
+    "of the run for which more was commanded than the thrusters give. Published: 40 mm (rigid) and 140 mm (compliant) "
+    "along z where the robot gives, and twice as much of the compliant robot along x where it receives."
 )
 
 

@@ -106,8 +106,8 @@ class FlyerStability(PublishedExperiment):
         )
         agree, stable = sum(said is rests for said, rests in clear), sum(said for said, _ in clear)
         claim = says.judged(
-            f"{agree} of {counted(len(clear), 'run')}, of which {stable} are stable by their poles; {len(near)} near the unit "
-            "circle left out",
+            f"{agree} of {counted(len(clear), 'run')}, of which {stable} are stable by their poles; "
+            f"{len(near)} near the unit circle left out",
             agree == len(clear) and not lost,
             f"all do whose largest pole is more than {_MARGIN:g} from the unit circle, and none was lost",
             f"Of the {len(near)} nearer ones {sum(said is rests for said, rests in near)} agree. Runs that diverged "

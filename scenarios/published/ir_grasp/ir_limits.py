@@ -187,8 +187,8 @@ def _no_worse(sentence: str, printed: str, held: Sequence[float], started: Seque
         interval.high < FEW,
         f"what is lost has an interval below {format_share(FEW)} of the scenes: of each, the share of levels that was "
         "not held, less 1 if it was not held undisturbed",
-        f"The mean of {counted(n, 'scene')} is {format_share(float(lost.mean()))}, by {interval.method} over scenes up to "
-        f"{format_share(interval.high)}.",
+        f"The mean of {counted(n, 'scene')} is {format_share(float(lost.mean()))}, by {interval.method} over scenes up "
+        f"to {format_share(interval.high)}.",
         runs=(n, min_trials_for(FEW)),
     )
 
