@@ -23,7 +23,7 @@ from handover.scenarios.execution.unit_values import (
     split_parameters,
 )
 from handover.scenarios.experiment.experiment import Experiment
-from handover.scenarios.experiment.parameters import InvalidParameter, text_of
+from handover.scenarios.experiment.parameters import InvalidParameter, idle_fault, idle_parameters, text_of
 from handover.scenarios.results.tolerated_faults import scenario_code
 
 
@@ -62,13 +62,17 @@ def checked_plan(plan: CampaignPlan) -> CampaignPlan:
 
     Raises:
         UsageError: there is no such scenario.
-        InvalidParameter: it has too many runs or none, or values that are invalid by themselves or together.
+        InvalidParameter: it has too many runs or none, values that are invalid by themselves or together, or parameters
+            of which nothing comes at any point.
     """
     experiment = plan.kind
     _check_size(plan)
     faults: dict[str, None] = {}
+    usual = {v.name: text_of(v, v.start) for v in experiment.parameters()}
     fixed: dict[str, str] = {}
     points: list[dict[str, str]] = []
+    idle: dict[str, str] = {}
+    at_work: set[str] = set()
     for number, point in enumerate(plan.points):
         try:
             chosen = {unit: point[unit] for unit in plan.varied_units if unit in point}
@@ -77,9 +81,13 @@ def checked_plan(plan: CampaignPlan) -> CampaignPlan:
             texts = {v.name: text_of(v, getattr(parameters, v.name)) for v in experiment.parameters()}
             texts |= {**of_units, **chosen}
             points.append({name: texts[name] for name in point})
+            idle_here = idle_parameters(experiment, parameters)
+            idle = {**idle_here, **idle}
+            at_work |= {n for n, text in texts.items() if n not in idle_here and text != usual.get(n)}
             fixed = {name: texts[name] for name in plan.fixed}
         except InvalidParameter as e:
             faults.update(dict.fromkeys(e.faults))
+    faults.update({idle_fault(name, needed): None for name, needed in idle.items() if name not in at_work})
     if faults:
         raise InvalidParameter(tuple(faults))
     return replace(plan, points=points, fixed=fixed)

@@ -31,7 +31,7 @@ def run_job(job: RunJob, folder: Path) -> None:
     """Run a job into a folder, without figures or a report; if it cannot begin, the folder says why.
 
     Raises:
-        As `run_task` and `RunRequest.open`, without `_REFUSALS`.
+        As `run_task` and `RunRequest.open_point`, without `_REFUSALS`.
     """
     with contextlib.ExitStack() as opened:
         task, clock = _task(job, folder, opened), ElapsedTime().clock()
@@ -64,7 +64,7 @@ def _task(job: RunJob, folder: Path, opened: contextlib.ExitStack) -> Task:
         step=job.step,
         inputs=Path(job.inputs) if job.inputs else None,
     )
-    asked = request.open(opened)
+    asked = request.open_point(opened)
     return Task(
         experiment=asked.experiment,
         parameters=asked.parameters,

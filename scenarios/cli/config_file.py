@@ -7,6 +7,7 @@ of these tables name by name.
 
 import contextlib
 import json
+from collections import Counter
 from collections.abc import Callable, Container, Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,7 +17,7 @@ import click
 import tomli
 from click.core import ParameterSource
 
-from handover.cosim.exceptions import first_faults, nearest, one_line
+from handover.cosim.exceptions import MOST_FAULTS, first_faults, nearest, one_line
 from handover.cosim.files import read_regular, reading_fault
 from handover.cosim.ssp.archive import ssp_root
 from handover.cosim.typed_data import checked, decoded
@@ -27,8 +28,10 @@ from handover.scenarios.cli.master_options import CONTROL_FIELDS
 from handover.scenarios.cli.options import HeadedCommand
 from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.execution.progress import say
-from handover.scenarios.execution.request import is_file
+from handover.scenarios.execution.request import experiment_type, is_file
 from handover.scenarios.execution.selection import is_path_of_class
+from handover.scenarios.execution.unit_values import split_parameters
+from handover.scenarios.experiment.parameters import InvalidParameter, idle_parameters
 from handover.scenarios.results.folder_data import RunData
 from handover.scenarios.results.run_folder import sha256_of, version_differences, versions
 
@@ -82,7 +85,17 @@ class ConfigFile:
         for name, texts in given.items():
             texts_of_file = replaced if name == "replaced" else self.texts.get(name, ())
             params[name] = (*(t for t in texts_of_file if name == "replaced" or _name(t) not in varied_or_set), *texts)
+        if self.run is not None and "grid" not in params:
+            self._leave_out_idle(params, varied_or_set)
         self._say(text for text in replaced if _is_own(text.partition("=")[2]))
+
+    def _leave_out_idle(self, params: dict[str, Any], typed: Container[str]) -> None:
+        """Leave out what a `run.json` has of parameters of which nothing comes, as in a point of a campaign."""
+        with contextlib.suppress(UsageError, InvalidParameter):  # the command finds the same faults
+            kind = experiment_type(params["scenario"])
+            idle = idle_parameters(kind, split_parameters(kind, params["parameters"])[0])
+            texts: Sequence[str] = params["parameters"]
+            params["parameters"] = tuple(t for t in texts if _name(t) in typed or _name(t) not in idle)
 
     def _say(self, own_code: Iterable[str]) -> None:
         """Say which code that is not this package's is about to be run."""
@@ -162,7 +175,8 @@ def read_config(path: Path, ctx: click.Context) -> ConfigFile:
             elif key == "p":
                 faults.append("no option 'p'; the table [parameters] has what -p sets")
             else:
-                faults.append(f"no option {key!r}; {nearest(key, {**options, **tables})}")
+                hint = nearest(key, {**options, **tables}) if len(faults) < MOST_FAULTS else ""
+                faults.append(f"no option {key!r}; {hint}")
         except click.BadParameter as e:
             faults.append(f"{key} = {_short(value)}: {e.message.rstrip('.')}")
         except ValueError as e:
@@ -176,11 +190,25 @@ def _content(path: Path) -> dict[str, Any]:
     form, example = ("JSON", '{"seed": 3}') if path.suffix.lower() == ".json" else ("TOML", "seed = 3")
     try:
         text = read_regular(path)
-        return decoded(text, dict[str, Any]) if form == "JSON" else tomli.loads(text.decode())
+        if form == "TOML":
+            return tomli.loads(text.decode())
+        content = decoded(text, dict[str, Any])
+        json.loads(text, object_pairs_hook=_without_repeats)
+        return content
     except OSError as e:
         raise UsageError(f"{path}: {reading_fault(e)}") from e
     except (ValueError, RecursionError) as e:  # of both parsers, and of bytes that are not UTF-8
         raise UsageError(f"{path}: it is not {form} of options, such as {example}: {one_line(e)}") from e
+
+
+def _without_repeats(pairs: Sequence[tuple[str, Any]]) -> None:
+    """Reject keys that are given twice, of which JSON takes the last.
+
+    Raises:
+        ValueError: there are some.
+    """
+    if twice := [name for name, count in Counter(name for name, _ in pairs).items() if count > 1]:
+        raise ValueError(f"{', '.join(first_faults([repr(name) for name in twice]))} given twice in one table")
 
 
 def _options(command: click.Command) -> Iterator[tuple[str, click.Parameter]]:

@@ -18,6 +18,7 @@ from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.progress import doing, say
 from handover.scenarios.execution.selection import find_scenario, replacements, select_fmus
 from handover.scenarios.execution.unit_values import built_system, split_parameters
+from handover.scenarios.experiment.parameters import check_effects
 from handover.scenarios.results.tolerated_faults import scenario_code
 
 _HELP = """Write a SCENARIO as an SSP (System Structure and Parameterization), which other tools load.
@@ -45,6 +46,7 @@ def export_command(
     experiment = find_scenario(scenario)
     with Interruption(), one_line_errors():
         values, of_units = split_parameters(experiment, parameters)
+        check_effects(experiment, values)
         if file.suffix.lower() != ".ssp":
             raise UsageError(f"--ssp {file}: a name that ends with .ssp is right; other tools know the file by it")
         check_new_file(f"--ssp {file}", file, force=force)

@@ -25,6 +25,7 @@ from handover.scenarios.execution.selection import find_scenario, own_source, pa
 from handover.scenarios.execution.ssp_run import checked_stop, is_ssp, open_experiment, source_of
 from handover.scenarios.execution.unit_values import split_parameters
 from handover.scenarios.experiment.experiment import Experiment, NoParameters
+from handover.scenarios.experiment.parameters import check_effects
 from handover.scenarios.results.run_folder import RunFolder, dated_folder
 from handover.scenarios.results.task import InputSources, Task
 
@@ -149,7 +150,18 @@ class RunRequest:
         """Return what is to be run; `opened` closes what that opens.
 
         Raises:
-            UsageError, InvalidParameter, CosimError: there is no such subject, or a value is invalid.
+            UsageError, InvalidParameter, CosimError: there is no such subject, a value is invalid, or nothing comes of
+                a parameter that is set.
+        """
+        asked = self.open_point(opened)
+        check_effects(type(asked.experiment), asked.parameters)
+        return asked
+
+    def open_point(self, opened: contextlib.ExitStack) -> OpenedSubject:
+        """Return the same for a point of a campaign, at others of which its parameters may have effects.
+
+        Raises:
+            As `open`, but for parameters of which nothing comes.
         """
         if isinstance(self.subject, System):
             if self.stop is None and not self.endless:

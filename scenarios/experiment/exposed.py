@@ -13,7 +13,7 @@ from typing import Any
 
 from handover.cosim.blocks.declarations import DeclarationError
 from handover.cosim.blocks.origins import Origin
-from handover.cosim.blocks.ports import declared_field
+from handover.cosim.blocks.ports import Need, declared_field
 from handover.cosim.system.system import System
 from handover.scenarios.experiment.places import Place
 
@@ -28,6 +28,7 @@ def expose(
     minimum: float | None = None,
     maximum: float | None = None,
     description: str = "",
+    needs: tuple[Need, ...] = (),
 ) -> Any:
     """Declare a scenario's parameter, as the default of a dataclass field, by that of a unit.
 
@@ -40,6 +41,7 @@ def expose(
         minimum: the scenario's own lower bound.
         maximum: its own upper bound.
         description: the scenario's own text.
+        needs: what others of the scenario's parameters must be for it to have an effect.
 
     Raises:
         DeclarationError: `params` does not declare it.
@@ -49,6 +51,7 @@ def expose(
     if "declaration" not in metadata:
         raise DeclarationError(params.__name__, name, "it cannot be exposed, as it is not declared")
     own = {"origin": origin, "minimum": minimum, "maximum": maximum, "description": description or None, "start": start}
+    own["needs"] = needs or None
     declaration = replace(metadata["declaration"], **{k: v for k, v in own.items() if v is not None})
     hint = metadata.get("type", _hints(params)[name])
     exposes = tuple(path for path in paths if "." in path) or metadata.get("exposes", ())

@@ -6,9 +6,10 @@ from typing import Any, cast
 import numpy as np
 
 from handover.cosim.blocks.declarations import short_repr
+from handover.cosim.blocks.ports import Need
 from handover.cosim.blocks.start_values import fault_of, range_of
 from handover.cosim.blocks.variable import Kind, Variable
-from handover.cosim.exceptions import first_faults, nearest, suggestion
+from handover.cosim.exceptions import MOST_FAULTS, first_faults, nearest, suggestion
 from handover.scenarios.experiment.experiment import Experiment
 
 
@@ -71,7 +72,8 @@ def texts_by_name(
         if not equals:
             faults.append(f"{text!r} is not of the form {form}")
         elif name not in known:
-            faults.append(UnknownParameter(f"{experiment.name} has no parameter", name, known))
+            near = known if len(faults) < MOST_FAULTS else ()  # of others the message has not the names
+            faults.append(UnknownParameter(f"{experiment.name} has no parameter", name, near))
         elif name in texts:
             faults.append(f"{name} is given twice")
         else:
@@ -86,6 +88,40 @@ def parameters_of(experiment: type[Experiment[Any]], kept: Mapping[str, Any]) ->
         InvalidParameter: some are unknown to the scenario or out of range, as in a run of another version.
     """
     return parse_parameters(experiment, [f"{name}={_as_text(value)}" for name, value in kept.items()])
+
+
+def idle_parameters(experiment: type[Experiment[Any]], parameters: Any) -> dict[str, str]:
+    """Return the parameters that are not at their defaults though nothing comes of them, with what each needs."""
+    variables = {v.name: v for v in experiment.parameters()}
+    found: dict[str, str] = {}
+    for v in variables.values():
+        lacking = [need for need in v.needs if not need.is_met(parameters)]
+        if lacking and text_of(v, getattr(parameters, v.name)) != text_of(v, v.start):
+            found[v.name] = " and ".join(_needed(need, variables) for need in lacking)
+    return found
+
+
+def check_effects(experiment: type[Experiment[Any]], parameters: Any) -> None:
+    """Reject parameters of which nothing comes, as others are.
+
+    Raises:
+        InvalidParameter: with what each needs to have an effect.
+    """
+    if idle := idle_parameters(experiment, parameters):
+        raise InvalidParameter([idle_fault(name, needed) for name, needed in idle.items()])
+
+
+def idle_fault(name: str, needed: str) -> str:
+    """Return the fault of a parameter of which nothing comes."""
+    return f"{name}: nothing comes of it unless {needed}"
+
+
+def _needed(need: Need, variables: Mapping[str, Variable]) -> str:
+    v = variables[need.names[0]]
+    texts = [text_of(v, value) for value in need.values] or [item.lower() for item, number in v.items if number]
+    if not texts:
+        return f"{' or '.join(need.names)} is set"
+    return f"{v.name}={' or '.join(texts)}" if all(texts) else f"{v.name} is empty"
 
 
 def parse_value(variable: Variable, text: str) -> tuple[Any, str | None]:

@@ -10,7 +10,7 @@ import numpy as np
 from handover.controllers.free_flyer.handover_parameters import Params as DecisionParams
 from handover.controllers.free_flyer.handover_team import Params as TeamDecisionParams
 from handover.cosim.blocks.origins import Origin, assumed, derived, stated
-from handover.cosim.blocks.ports import Floats, parameter
+from handover.cosim.blocks.ports import Floats, any_of, being, parameter
 from handover.cosim.blocks.units import Newton, NewtonMetre, Number, Second
 from handover.plants.free_flyer.hand.parameters import Params as PersonParams
 from handover.plants.free_flyer.large_object.parameters import Params as LargeObjectParams
@@ -64,6 +64,10 @@ class Hand(_OfUnit):
     OUTSIDE = 1
 
 
+_SIMULATED_PERSON = (being("hand", Hand.SIMULATED), being("hand_track", ""))
+"""What a person's skill and senses need; strength is also the force at which any arm yields."""
+
+
 @dataclass(frozen=True)
 class Body:
     """Mass, kg, inertia about the centre of mass, (3, 3), kg m^2, and gripper seen from it, m, both in B."""
@@ -103,6 +107,7 @@ class RobotAndModel:
         minimum=0,
         maximum=12,
         origin=assumed("all nozzles are whole"),
+        needs=(being("propulsion", Propulsion.NOZZLES),),
     )
 
     @property
@@ -170,10 +175,11 @@ class HandoverParameters(RobotAndModel):
         origin=assumed(
             "not given; the participants had little or no practice (sec. 5.4) and failed in 0 to 15 of 100 (sec. 5.8)"
         ),
+        needs=_SIMULATED_PERSON,
     )
-    sight_error: float = expose(PersonParams, "person.sight_error", maximum=0.1)
-    depth_error: float = expose(PersonParams, "person.depth_error", maximum=0.1)
-    interface_delay: float = expose(PersonParams, "person.interface_delay", maximum=2.0)
+    sight_error: float = expose(PersonParams, "person.sight_error", maximum=0.1, needs=_SIMULATED_PERSON)
+    depth_error: float = expose(PersonParams, "person.depth_error", maximum=0.1, needs=_SIMULATED_PERSON)
+    interface_delay: float = expose(PersonParams, "person.interface_delay", maximum=2.0, needs=_SIMULATED_PERSON)
     propulsion: Propulsion = parameter(
         Propulsion.LIMITED,
         "what the thrusters are like",
@@ -284,7 +290,7 @@ class TeamParameters(HandoverParameters):
     hands: Hands = parameter(
         Hands.TWO, "with which hands the person holds the object, and where", origin=derived("sec. 6.3: both hands")
     )
-    hand_delay: float = expose(LargeObjectParams, "person.hand_delay", maximum=5.0)
+    hand_delay: float = expose(LargeObjectParams, "person.hand_delay", maximum=5.0, needs=(being("hands", Hands.TWO),))
     together: bool = expose(TeamDecisionParams, "decision.together")
     object_mass: float = expose(LargeObjectParams, "person.object_mass", minimum=0.1, maximum=50.0)
 
@@ -318,9 +324,14 @@ class ImpedanceParameters(RobotAndModel):
         Wrench.FORCE, "whether the gripper is pushed or twisted", origin=stated("sec. 4.1.3: forces and torques")
     )
     axis: Axis = parameter(Axis.X, "axis of W of the push", origin=stated("figs. 4.5-4.16: each axis"))
-    force: float = expose(PushParams, "push.force", minimum=-50.0, maximum=50.0)
+    force: float = expose(PushParams, "push.force", minimum=-50.0, maximum=50.0, needs=(being("kind", Wrench.FORCE),))
     torque: NewtonMetre = parameter(
-        3.0, "torque of a twist", minimum=-10.0, maximum=10.0, origin=stated("figs. 4.8-4.10, 4.14-4.16")
+        3.0,
+        "torque of a twist",
+        minimum=-10.0,
+        maximum=10.0,
+        origin=stated("figs. 4.8-4.10, 4.14-4.16"),
+        needs=(being("kind", Wrench.TORQUE),),
     )
     begin: float = expose(PushParams, "push.start", maximum=60.0)
     duration: float = expose(PushParams, "push.duration", maximum=60.0)
@@ -342,6 +353,7 @@ class ImpedanceParameters(RobotAndModel):
         True,
         "whether the controller knows both delays, and rejects ones it is unstable with",
         origin=assumed("delays that are known are part of the controller's stability check"),
+        needs=(any_of("delay", "navigation_delay"),),
     )
     patience: float = expose(
         HandoverParameters, "patience", description="time after the push by which the robot must rest"

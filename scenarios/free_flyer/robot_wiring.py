@@ -75,17 +75,10 @@ def expected_lag(propulsion: Propulsion) -> float:
 
 
 def thruster_settings(propulsion: Propulsion, stuck_nozzle: int) -> dict[str, Any]:
-    """Return the parameters of the thrusters' unit.
-
-    Raises:
-        InvalidParameter: a nozzle is stuck of thrusters that have none.
-    """
+    """Return the parameters of the thrusters' unit; without nozzles none is stuck."""
     settings: dict[str, Any] = {"propulsion": propulsion.item}
-    if stuck_nozzle == 0:
+    if stuck_nozzle == 0 or propulsion is not Propulsion.NOZZLES:
         return settings
-    if propulsion is not Propulsion.NOZZLES:
-        text = f"propulsion {propulsion.item} has no nozzle that could be; set propulsion nozzles, or 0"
-        raise InvalidParameter([f"stuck_nozzle: {stuck_nozzle} is to be stuck, and {text}"])
     opens = np.ones(12)
     opens[stuck_nozzle - 1] = 0.0
     return settings | {"flapper_range": opens}
@@ -250,14 +243,8 @@ def wired_push(
         seed: of the navigation's noise.
         controller: parameters of the controller, and its goal, besides what it knows of delays.
         robot: parameters of the robot.
-
-    Raises:
-        InvalidParameter: a force is given of a twist, or a torque of a push.
     """
     is_force, s = p.kind is Wrench.FORCE, System()
-    idle = "torque" if is_force else "force"
-    if getattr(p, idle) != getattr(type(p)(), idle):
-        raise InvalidParameter([f"{idle}: it is that of kind={idle} alone"])
     lateness: dict[str, Any] = {
         "delay": p.delay + p.navigation_delay if p.delay_known else 0.0,
         "lag": expected_lag(p.propulsion),

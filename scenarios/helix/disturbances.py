@@ -12,7 +12,7 @@ import numpy as np
 
 from handover.controllers.helix.servo.servo_parameters import Params as ServoParams
 from handover.cosim.blocks.origins import assumed, derived
-from handover.cosim.blocks.ports import Floats, parameter
+from handover.cosim.blocks.ports import Floats, any_of, parameter
 from handover.cosim.blocks.units import Metre, Number, Pixel, Radian, Second
 from handover.plants.helix.arm.tendon_parameters import Params as ArmParams
 from handover.plants.helix.cameras.camera_parameters import Params as CameraParams
@@ -74,6 +74,7 @@ class Disturbances:
         maximum=600.0,
         description="time at which the hand moves on, if it does",
         origin=assumed("own choice: while the arm approaches"),
+        needs=(any_of("move_azimuth", "move_height"),),
     )
     move_for: Second = parameter(
         2.0,
@@ -81,6 +82,7 @@ class Disturbances:
         minimum=0.1,
         maximum=600.0,
         origin=assumed("own choice: an unhurried motion of a hand"),
+        needs=(any_of("move_azimuth", "move_height"),),
     )
     click_noise: Pixel = parameter(
         0.5,
@@ -113,6 +115,7 @@ class Disturbances:
         minimum=0.0,
         maximum=600.0,
         origin=assumed("own choice: while the arm approaches"),
+        needs=(any_of("hide_for"),),
     )
     hide_for: Second = parameter(
         0.0,
@@ -130,9 +133,15 @@ class Disturbances:
         minimum=0.0,
         maximum=600.0,
         origin=assumed("own choice: while the arm approaches"),
+        needs=(any_of("cover"),),
     )
     cover_for: Second = parameter(
-        2.0, "how long the lens is covered", minimum=0.0, maximum=600.0, origin=assumed("own choice")
+        2.0,
+        "how long the lens is covered",
+        minimum=0.0,
+        maximum=600.0,
+        origin=assumed("own choice"),
+        needs=(any_of("cover"),),
     )
     jitter: float = expose(ServoParams, "servo.jitter")
 

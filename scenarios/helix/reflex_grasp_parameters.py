@@ -6,7 +6,7 @@ from typing import Any
 
 from handover.controllers.helix.reflex.grasp_reflex import Params as ReflexParams
 from handover.cosim.blocks.origins import assumed
-from handover.cosim.blocks.ports import parameter
+from handover.cosim.blocks.ports import any_of, being, parameter
 from handover.cosim.blocks.units import Metre
 from handover.plants.helix.finger_infrared import Params as FingerParams
 from handover.scenarios.experiment.exposed import expose
@@ -44,15 +44,28 @@ class ReflexGraspParameters:
         minimum=0.0,
         maximum=0.15,
         origin=assumed("from there the fingers' sensors see the ball; a gripper with pads hides it"),
+        needs=(any_of("cameras"),),
     )
     offer: Offer = parameter(
         Offer.DRAWN,
         "where the ball is offered: drawn by the seed, or as given",
         origin=assumed("evenly over reach and sight"),
     )
-    azimuth: float = expose(Parameters, "azimuth", description="of a given place: its direction from the arm's axis")
-    radius: float = expose(Parameters, "radius", description="of a given place: its distance from the arm's axis")
-    height: float = expose(Parameters, "height", description="of a given place: its height in W")
+    azimuth: float = expose(
+        Parameters,
+        "azimuth",
+        description="of a given place: its direction from the arm's axis",
+        needs=(being("offer", Offer.GIVEN),),
+    )
+    radius: float = expose(
+        Parameters,
+        "radius",
+        description="of a given place: its distance from the arm's axis",
+        needs=(being("offer", Offer.GIVEN),),
+    )
+    height: float = expose(
+        Parameters, "height", description="of a given place: its height in W", needs=(being("offer", Offer.GIVEN),)
+    )
     alpha: float = expose(Parameters, "alpha")
     patience: float = expose(Parameters, "patience")
     tremor: float = expose(Parameters, "tremor")

@@ -13,7 +13,7 @@ import numpy as np
 from handover.controllers.ir_grasp.parameters import Correction, Strategy
 from handover.controllers.ir_grasp.parameters import Params as Reflex
 from handover.cosim.blocks.origins import assumed, stated
-from handover.cosim.blocks.ports import Floats, Vector2, parameter
+from handover.cosim.blocks.ports import Floats, Vector2, any_of, being, parameter
 from handover.cosim.blocks.units import Metre, MetrePerSecond, Radian
 from handover.cosim.record.reader import Record
 from handover.plants.ir_grasp.hand import PALM
@@ -22,6 +22,7 @@ from handover.plants.ir_grasp.parameters import Params as Scene
 from handover.plants.ir_grasp.shapes import polygon_faults
 from handover.scenarios.experiment.exposed import expose
 
+_DRAWN_SHIFT = (being("perturbed", True), being("shift", np.zeros(2)), being("turn", 0.0))
 _OWN_TEST = assumed("a test of our own; not in the paper")
 
 
@@ -38,11 +39,11 @@ class Parameters:
     """One grasp. The run's seed draws the perturbation and what vision is off by, the same for any strategy."""
 
     thing: Thing = expose(Scene, "scene.thing")
-    disc_radius: float = expose(Scene, "scene.disc_radius")
-    bar_size: Floats = expose(Scene, "scene.bar_size")
-    corners: Floats = expose(Scene, "scene.corners")
-    corner_count: int = expose(Scene, "scene.corner_count")
-    thing_seed: int = expose(Scene, "scene.thing_seed")
+    disc_radius: float = expose(Scene, "scene.disc_radius", needs=(being("thing", Thing.DISC),))
+    bar_size: Floats = expose(Scene, "scene.bar_size", needs=(being("thing", Thing.BAR),))
+    corners: Floats = expose(Scene, "scene.corners", needs=(being("thing", Thing.POLYGON),))
+    corner_count: int = expose(Scene, "scene.corner_count", needs=(being("thing", Thing.POLYGON),))
+    thing_seed: int = expose(Scene, "scene.thing_seed", needs=(being("thing", Thing.DRAWN),))
     expected: Expected = parameter(
         Expected.AS_IT_IS,
         "the shape that vision takes the object for",
@@ -54,6 +55,7 @@ class Parameters:
         minimum=5e-3,
         maximum=0.1,
         origin=_OWN_TEST,
+        needs=(being("expected", Expected.DISC),),
     )
     expected_size: Vector2[Metre] = parameter(
         np.array([0.11, 0.03]),
@@ -61,6 +63,7 @@ class Parameters:
         minimum=5e-3,
         maximum=0.3,
         origin=_OWN_TEST,
+        needs=(being("expected", Expected.BAR),),
     )
     expected_yaw: Radian = parameter(
         0.0,
@@ -73,8 +76,10 @@ class Parameters:
         True, "the object was moved after vision saw it", origin=stated("table I has nominal and perturbed poses")
     )
     strategy: Strategy = expose(Reflex, "reflex.strategy")
-    forward: float = expose(Reflex, "reflex.forward_distance", maximum=0.3)
-    correction: Correction = expose(Reflex, "reflex.correction")
+    forward: float = expose(
+        Reflex, "reflex.forward_distance", maximum=0.3, needs=(being("strategy", Strategy.FORWARD),)
+    )
+    correction: Correction = expose(Reflex, "reflex.correction", needs=(being("strategy", Strategy.REFLEX),))
     last_grasp: str = parameter(
         "",
         "folder of an earlier run, whose estimated Jacobian correction=fast begins with; empty: the hand's design",
@@ -83,8 +88,9 @@ class Parameters:
             "of 40, nor the time of refinement, 4.4 s in the median: sensors say soon enough what the "
             "design leaves open"
         ),
+        needs=(being("correction", Correction.FAST),),
     )
-    literal: bool = expose(Reflex, "reflex.literal")
+    literal: bool = expose(Reflex, "reflex.literal", needs=(being("strategy", Strategy.REFLEX),))
     standoff: Metre = parameter(
         0.07,
         "gap between palm and object at the pre-grasp pose that vision asks for",
@@ -104,6 +110,7 @@ class Parameters:
             "not given; slightly moved (sec. V-A); chosen so that the blind hand misses the object, as in "
             "table I (sec. V-D)"
         ),
+        needs=_DRAWN_SHIFT,
     )
     shift_most: Metre = parameter(
         0.05,
@@ -114,6 +121,7 @@ class Parameters:
             "not given; slightly moved (sec. V-A); chosen so that the blind hand misses the object, as in "
             "table I (sec. V-D)"
         ),
+        needs=_DRAWN_SHIFT,
     )
     shift_spread: Radian = parameter(
         math.pi / 2.0,
@@ -124,6 +132,7 @@ class Parameters:
             "not given; chosen so that the blind hand fails as in table I: it misses what was moved to "
             "the side or away, not what was moved towards it"
         ),
+        needs=_DRAWN_SHIFT,
     )
     turn_most: Radian = parameter(
         0.35,
@@ -131,6 +140,7 @@ class Parameters:
         minimum=0.0,
         maximum=math.pi,
         origin=assumed("not given; about 20 degrees"),
+        needs=_DRAWN_SHIFT,
     )
     shift: Vector2[Metre] = parameter(
         np.zeros(2),
@@ -159,13 +169,14 @@ class Parameters:
         minimum=-math.pi,
         maximum=math.pi,
         origin=_OWN_TEST,
+        needs=(any_of("carried_speed"),),
     )
-    carried_from: float = expose(Scene, "scene.carry_from", maximum=90.0)
-    carried_until: float = expose(Scene, "scene.carry_until", maximum=90.0)
+    carried_from: float = expose(Scene, "scene.carry_from", maximum=90.0, needs=(any_of("carried_speed"),))
+    carried_until: float = expose(Scene, "scene.carry_until", maximum=90.0, needs=(any_of("carried_speed"),))
     nudge: Floats = expose(Scene, "scene.nudge", minimum=-0.1, maximum=0.1)
-    nudge_time: float = expose(Scene, "scene.nudge_time", maximum=90.0)
+    nudge_time: float = expose(Scene, "scene.nudge_time", maximum=90.0, needs=(any_of("nudge"),))
     other_radius: float = expose(Scene, "scene.other_radius")
-    other_place: Floats = expose(Scene, "scene.p_WX_0")
+    other_place: Floats = expose(Scene, "scene.p_WX_0", needs=(any_of("other_radius"),))
     vision_position: Metre = parameter(
         0.003,
         "standard deviation of the pre-grasp position, by axis",
@@ -195,10 +206,7 @@ class Parameters:
             faults.append(f"shift_least {self.shift_least:g} m must be at most shift_most {self.shift_most:g} m")
         if self.literal and self.correction is Correction.FAST:
             faults.append("literal: takes the paper's equations as printed, which correction=paper alone uses")
-        faults.extend(self._without_effect())
-        if self.last_grasp and not (self.correction is Correction.FAST and self.strategy is Strategy.REFLEX):
-            faults.append("last_grasp: its Jacobian is what correction=fast of strategy=reflex begins with")
-        elif self.last_grasp:
+        if self.last_grasp:
             try:
                 self.jacobian_offset()
             except ValueError as e:
@@ -228,26 +236,6 @@ class Parameters:
             plain = solid_of(shape, disc_radius=self.expected_radius, bar_size=self.expected_size)
             believed = replace(plain, yaw=self.solid.yaw)
         return replace(believed, yaw=believed.yaw + self.expected_yaw)
-
-    def _without_effect(self) -> list[str]:
-        """Return the parameters that were given though nothing would come of them."""
-        effects = {
-            "disc_radius": (self.thing is Thing.DISC, "thing=disc"),
-            "bar_size": (self.thing is Thing.BAR, "thing=bar"),
-            "corners": (self.thing is Thing.POLYGON, "thing=polygon"),
-            "corner_count": (self.thing is Thing.POLYGON, "thing=polygon"),
-            "thing_seed": (self.thing is Thing.DRAWN, "thing=drawn"),
-            "expected_radius": (self.expected is Expected.DISC, "expected=disc"),
-            "expected_size": (self.expected is Expected.BAR, "expected=bar"),
-            "nudge_time": (bool(np.any(self.nudge)), "a nudge"),
-            "other_place": (self.other_radius > 0.0, "an other_radius above 0"),
-        }
-        default = type(self)()
-        return [
-            f"{name}: it is that of {needed} alone"
-            for name, (has_effect, needed) in effects.items()
-            if not has_effect and not np.array_equal(getattr(self, name), getattr(default, name))
-        ]
 
     def jacobian_offset(self) -> Floats:
         """Return what the last grasp found the Jacobian to be off its design by, (3, 4); zeros without one.

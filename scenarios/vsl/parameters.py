@@ -16,7 +16,7 @@ from handover.controllers.vsl.trajectory_planner import Elbow, Path, segments_by
 from handover.controllers.vsl.trajectory_planner import Params as Planner
 from handover.controllers.vsl.waypoints import InvalidWaypoints
 from handover.cosim.blocks.origins import assumed, stated
-from handover.cosim.blocks.ports import Floats, parameter
+from handover.cosim.blocks.ports import Floats, any_of, being, parameter
 from handover.cosim.blocks.schedule import InvalidSchedule, Schedule
 from handover.cosim.blocks.units import Kilogram, Metre, Number, Pascal
 from handover.plants.vsl.parameters import MAX_PRESSURE, Link, Motion
@@ -74,7 +74,7 @@ class Parameters:
     """One run along a path, controlled by rigid-link kinematics."""
 
     path: Path = expose(Planner, "planner.path")
-    waypoints: str = expose(Planner, "planner.waypoints")
+    waypoints: str = expose(Planner, "planner.waypoints", needs=(being("path", Path.CUSTOM),))
     load: Kilogram = parameter(
         0.075,
         "mass that hangs at the gripper; the paper's are 0 to 0.1 kg",
@@ -120,7 +120,9 @@ class Parameters:
         ),
     )
     elbow: Elbow = expose(Planner, "planner.elbow", "kinematics.elbow")
-    x_0: Floats = expose(Planner, "planner.x_0", minimum=-1.0, maximum=1.0)
+    x_0: Floats = expose(
+        Planner, "planner.x_0", minimum=-1.0, maximum=1.0, needs=(being("path", Path.CUSTOM), being("waypoints", ""))
+    )
     x_g: Floats = expose(
         Planner,
         "planner.x_g",
@@ -128,6 +130,7 @@ class Parameters:
         minimum=-1.0,
         maximum=1.0,
         origin=assumed("end of a path of one's own; middle of the paper's curve"),
+        needs=(being("path", Path.CUSTOM), being("waypoints", "")),
     )
     EI_factor: Number = parameter(
         1.0,
@@ -165,7 +168,11 @@ class Parameters:
         origin=assumed("one arm was built, whose scatter is not given"),
     )
     arm_seed: int = parameter(
-        0, "which arm of those that scatter; apart from the run's seed", minimum=0, origin=assumed("own choice")
+        0,
+        "which arm of those that scatter; apart from the run's seed",
+        minimum=0,
+        origin=assumed("own choice"),
+        needs=(any_of("arm_scatter", "length_scatter"),),
     )
     tolerance: Metre = parameter(
         0.06,
@@ -246,22 +253,18 @@ class Parameters:
         return segments_by(self.path, self.x_0, self.x_g, self.waypoints)
 
     def path_faults(self) -> list[str]:
-        """Return faults of the path's ends: below the ground, or given for a path that has ends of its own."""
-        default, faults = type(self)(), list[str]()
-        for name, p_WG, p_WG_default in (("x_0", self.x_0, default.x_0), ("x_g", self.x_g, default.x_g)):
-            if self.waypoints and self.path is Path.CUSTOM and not np.array_equal(p_WG, p_WG_default):
-                faults.append(f"{name}: the path goes by the waypoints of {self.waypoints}; {name} is for a line only")
-            elif self.path is not Path.CUSTOM and not np.array_equal(p_WG, p_WG_default):
-                path = self.path.name.lower()
-                faults.append(f"{name}: the path {path} has ends of its own; {name} is for path=custom only")
-            elif self.path is Path.CUSTOM and p_WG[2] < 0.0:
-                faults.append(f"{name}: {format_point(p_WG)} is below the ground, z = 0 in W; its z must be at least 0")
-        return faults + self._waypoint_faults() if self.waypoints else faults
+        """Return faults of a custom path: an end or a point below the ground, or what is wrong with its file."""
+        if self.path is not Path.CUSTOM:
+            return []
+        if self.waypoints:
+            return self._waypoint_faults()
+        return [
+            f"{name}: {format_point(p_WG)} is below the ground, z = 0 in W; its z must be at least 0"
+            for name, p_WG in (("x_0", self.x_0), ("x_g", self.x_g))
+            if p_WG[2] < 0.0
+        ]
 
     def _waypoint_faults(self) -> list[str]:
-        if self.path is not Path.CUSTOM:
-            path = self.path.name.lower()
-            return [f"waypoints: the path {path} has points of its own; waypoints is for path=custom only"]
         try:
             segments = self.segments()
         except InvalidWaypoints as e:

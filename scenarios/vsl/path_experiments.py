@@ -83,8 +83,8 @@ class PathExperiment(Experiment[PathEvaluator]):
         """Wire planner, kinematics and arm.
 
         Raises:
-            InvalidParameter: an end of the path is below the ground, or is given for a path that has ends of its own; a
-                pressure of link 3 is out of range; loads or pressures over time are no schedule.
+            InvalidParameter: an end of the path is below the ground; a pressure of link 3 is out of range; loads or
+                pressures over time are no schedule.
         """
         p = parameters
         if faults := p.contradictions():

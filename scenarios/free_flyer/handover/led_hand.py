@@ -15,8 +15,6 @@ from handover.scenarios.free_flyer.parameters import Hand, HandoverParameters
 
 NEVER_TRACKED = 1e6
 """Age of tracking that never began, s: more than any limit."""
-_OF_SIMULATED_PERSON = ("skill", "sight_error", "depth_error", "interface_delay")
-"""Parameters that only a simulated person has; strength is also the force at which any arm yields."""
 _PERSON = ("person", "PERSON", int(Driver.PERSON))
 _FASTEST = 10.0
 """Speed of a hand, m/s, above which its track is taken for broken (assumed): a fast reach makes about 5 m/s."""
@@ -35,26 +33,17 @@ def leader(p: HandoverParameters, stop: float) -> dict[str, Any]:
         stop: when a run ends at the latest, s.
 
     Raises:
-        InvalidParameter: the track cannot be followed, or no handover can be made of it; or what is given is for
-            another kind of hand.
+        InvalidParameter: the track cannot be followed, no handover can be made of it, or two are to lead the hand.
     """
     if not p.is_led:
         return {}
-    standard = type(p)()
-    given = [name for name in _OF_SIMULATED_PERSON if getattr(p, name) != getattr(standard, name)]
-    led = "hand=outside" if p.hand is Hand.OUTSIDE else "hand_track"
-    faults = [
-        f"{name}: of a simulated person alone; with {led} leave it at {getattr(standard, name):g}" for name in given
-    ]
     path = Path(p.hand_track).absolute()
-    if p.hand is not Hand.OUTSIDE:
-        faults = _faults_of_file(path, stop) + faults
-    elif p.hand_track:
-        faults.insert(0, "hand_track: a track leads the hand, or hand=outside does: give one of them")
-    if faults:
-        raise InvalidParameter(faults)
     if p.hand is Hand.OUTSIDE:
+        if p.hand_track:
+            raise InvalidParameter(["hand_track: a track leads the hand, or hand=outside does: give one of them"])
         return {"driven_by": "outside", "age": NEVER_TRACKED}
+    if faults := _faults_of_file(path, stop):
+        raise InvalidParameter(faults)
     return {"driven_by": "track", "track": str(path)}
 
 

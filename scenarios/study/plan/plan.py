@@ -20,7 +20,7 @@ from handover.cosim.files import read_regular, reading_fault
 from handover.cosim.typed_data import Name, Text, all_faults, checked, unknown_names
 from handover.scenarios.catalog import SCENARIOS, InvalidScenario, installed_scenarios, named_scenario
 from handover.scenarios.experiment.experiment import Experiment
-from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters
+from handover.scenarios.experiment.parameters import InvalidParameter, check_effects, parse_parameters
 
 DEVICES: Mapping[str, str] = {
     "mouse": "mouse and keyboard",
@@ -361,6 +361,6 @@ def _scenario(name: str, where: str, faults: list[str]) -> type[Experiment[Any]]
 
 def _check_parameters(condition: Condition, scenario: type[Experiment[Any]], faults: list[str]) -> None:
     try:
-        parse_parameters(scenario, condition.given)
+        check_effects(scenario, parse_parameters(scenario, condition.given))
     except InvalidParameter as e:
         faults += [f"tasks.{condition.task}, {condition.behaviour}: {fault}" for fault in e.faults]

@@ -69,8 +69,8 @@ def plan(**given: object) -> CampaignPlan:
 
 
 def test_texts_of_the_same_values_make_the_same_plan():
-    one = plan(points=[{"forward": ".10"}], fixed={"thing": "CYLINDER", "literal": "True"})
-    other = plan(points=[{"forward": "0.1"}], fixed={"thing": "cylinder", "literal": "true"})
+    one = plan(points=[{"forward": ".10"}], fixed={"strategy": "FORWARD", "perturbed": "True"})
+    other = plan(points=[{"forward": "0.1"}], fixed={"strategy": "forward", "perturbed": "true"})
     assert checked_plan(one) == checked_plan(other) == other
 
 
@@ -86,6 +86,15 @@ def test_values_that_do_not_fit_each_other_are_reported_with_their_point():
         checked_plan(plan(points=[{"shift_least": f"0.0{n}"} for n in range(51, 75)]))
     assert len(caught.value.faults) == 24
     assert str(caught.value).endswith("; and 4 more")
+
+
+def test_a_value_counts_if_something_comes_of_it_at_one_of_the_points():
+    """One that nothing comes of at any point is refused."""
+    strategies = [{"strategy": "reflex"}, {"strategy": "forward"}]
+    checked_plan(plan(points=strategies, fixed={"forward": "0.055"}))
+    with pytest.raises(InvalidParameter) as caught:
+        checked_plan(plan(points=[*strategies[:1], {"strategy": "blind"}], fixed={"forward": "0.055"}))
+    assert [fault.partition(":")[0] for fault in caught.value.faults] == ["forward"]
 
 
 @pytest.mark.parametrize(("points", "repetitions"), [(0, 1), (1, 0), (1, 10_001), (20, 9000)])

@@ -30,7 +30,7 @@ format = ["csv", "mat"]
 isolate = "reflex"
 
 [parameters]
-strategy = "reflex"
+strategy = "forward"
 forward = 0.05
 reflex.damping = 0.5
 
@@ -50,7 +50,7 @@ def test_a_file_gives_what_is_run_and_the_options(tmp_path: Path):
     got = parsed(run_command, tmp_path, RUN)
     assert (got["scenario"], got["seed"], got["stop"], got["call_limit"]) == ("ir_grasp", 3, Fraction(3, 10), 30.0)
     assert (got["no_report"], got["formats"], got["isolate"]) == (True, ("csv", "mat"), ("reflex",))
-    texts = ("strategy=reflex", "forward=0.05", "reflex.damping=0.5", "scene.grip_friction=0.4")
+    texts = ("strategy=forward", "forward=0.05", "reflex.damping=0.5", "scene.grip_friction=0.4")
     assert got["parameters"] == texts
     assert (got["algorithm"], got["strict"]) == ("gauss-seidel", False)
     text = '{"scenario": "x.fmu", "step": "1/30", "parameters": {"on": true, "p": [1, 2.5]}, "unit": {"arm": "my:Arm"}}'
@@ -64,7 +64,12 @@ def test_the_command_line_comes_first_of_tables_name_by_name(tmp_path: Path):
     given = ("--seed", "7", "-p", "forward=0.1", "--unit", "reflex=c.fmu", "vsl_hybrid", "--format", "csv")
     got = parsed(run_command, tmp_path, text, *given)
     assert (got["scenario"], got["seed"], got["formats"]) == ("vsl_hybrid", 7, ("csv",))
-    assert set(got["parameters"]) == {"strategy=reflex", "forward=0.1", "reflex.damping=0.5", "scene.grip_friction=0.4"}
+    assert set(got["parameters"]) == {
+        "strategy=forward",
+        "forward=0.1",
+        "reflex.damping=0.5",
+        "scene.grip_friction=0.4",
+    }
     assert set(got["replaced"]) == {"scene=a.fmu", "reflex=c.fmu"}
 
 
@@ -99,6 +104,8 @@ def test_a_sweep_has_a_table_of_values_to_vary(tmp_path: Path):
     [
         "seed = ",
         "[3]",
+        '{"seed": 1, "seed": 2}',
+        '{"parameters": {"strategy": "blind", "thing": "disc", "strategy": "forward"}}',
         "sed = 3",
         "p = {forward = 0.1}",
         "controls = 'folder'",
@@ -122,7 +129,7 @@ def test_a_sweep_has_a_table_of_values_to_vary(tmp_path: Path):
     ids=str.strip,
 )
 def test_what_is_wrong_is_told_in_one_line_and_nothing_is_written(text: str, tmp_path: Path, wording: Wording):
-    file = tmp_path / ("run.json" if text.startswith("[") else "run.toml")
+    file = tmp_path / ("run.json" if text.startswith(("[", "{")) else "run.toml")
     file.write_text(text, encoding="utf-8")
     told = refusal("run", "--config", file, "--out", tmp_path / "out")
     assert told.count("\n") == 1
@@ -156,7 +163,20 @@ def test_it_can_be_changed_by_the_command_line_and_be_swept(first: Path):
     got = sweep_command.make_context("sweep", [*options, "forward=0.03,0.1", "--seed", "9"]).params
     assert (got["scenario"], got["seed"], got["grid"]) == ("ir_grasp", 9, ("forward=0.03,0.1",))
     assert not [text for text in got["parameters"] if text.startswith("forward=")]
-    assert {"strategy=reflex", "reflex.damping=0.5"} < set(got["parameters"])
+    assert {"strategy=forward", "reflex.damping=0.5"} < set(got["parameters"])
+
+
+@pytest.mark.parametrize(
+    ("typed", "left"), [((), []), (("strategy=forward",), ["forward=0.05"]), (("forward=0.1",), ["forward=0.1"])]
+)
+def test_what_nothing_comes_of_in_a_point_of_a_campaign_is_left_out(
+    typed: tuple[str, ...], left: list[str], first: Path, tmp_path: Path
+):
+    data = data_in(first, "run")
+    data["parameters"]["strategy"] = "blind"
+    given = [part for text in typed for part in ("-p", text)]
+    got = parsed(run_command, tmp_path, json.dumps(data), *given, name="run.json")["parameters"]
+    assert [text for text in got if text.startswith("forward=")] == left
 
 
 def test_all_options_of_the_master_are_repeated(first: Path, tmp_path: Path):

@@ -101,9 +101,6 @@ def test_a_track_of_which_no_handover_can_be_made_is_refused_at_once(tmp_path: P
 def test_what_only_a_simulated_person_has_is_refused_beside_a_track(tmp_path: Path, wording: Wording):
     led = f"hand_track={track_at_rest(tmp_path / 'track.csv')}"
     with pytest.raises(InvalidParameter) as refused:
-        run(RobotToHuman, tmp_path / "led", led, "skill=0.5", "interface_delay=0.2", "strength=3")
-    assert [fault.partition(":")[0] for fault in refused.value.faults] == ["skill", "interface_delay"]
-    with pytest.raises(InvalidParameter) as refused:
         run(RobotToHuman, tmp_path / "led", led, "person.effort=3")
     wording.check(refused.value)
 

@@ -56,15 +56,11 @@ def test_the_command_says_that_nobody_leads_it(tmp_path: Path):
 @pytest.mark.parametrize(
     ("scenario", "given", "faults"),
     [
-        (
-            RobotToHuman,
-            ("skill=0.5", "interface_delay=0.1", "hand_track=t.csv", "strength=3"),
-            ["hand_track", "skill", "interface_delay"],
-        ),
+        (RobotToHuman, ("hand_track=t.csv", "strength=3"), ["hand_track"]),
         (TwoRobots, (), ["hand"]),
     ],
 )
-def test_what_only_a_simulated_person_has_is_refused_with_the_reason(
+def test_what_cannot_lead_the_hand_beside_inputs_from_outside_is_refused(
     scenario: type[Experiment[Any]], given: tuple[str, ...], faults: list[str], wording: Wording
 ):
     with pytest.raises(InvalidParameter) as refused:

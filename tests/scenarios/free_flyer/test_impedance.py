@@ -96,9 +96,6 @@ SOFT = "impedance.stiffness_translation=5,0,0,0,67,0,0,0,67"
         ((SOFT,), 1),
         (("robot.lower_J=2,2,2", "robot.upper_J=-1,-1,-1"), 2),
         (("force=1000", "axis=w", "duration=-1"), 3),
-        (("propulsion=limited", "stuck_nozzle=3"), 1),
-        (("torque=5",), 1),
-        (("kind=torque", "force=9"), 1),
     ],
 )
 def test_values_that_are_bad_or_have_no_effect_are_refused(

@@ -1,6 +1,5 @@
 """The grasp itself, also with the correction on the move, on the built FMUs."""
 
-import dataclasses
 import json
 from pathlib import Path
 from typing import Any
@@ -149,4 +148,3 @@ def test_a_last_grasp_that_is_none_is_refused(tmp_path: Path, wording: Wording):
     wording.check(*fast.faults())
     pq.write_table(pa.table({"time": [0.0], "reflex.steps": [0]}), tmp_path / "signals.parquet")
     wording.check(*fast.faults())
-    wording.check(*dataclasses.replace(fast, correction=Correction.PAPER).faults())
