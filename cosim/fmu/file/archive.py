@@ -28,7 +28,8 @@ STANDARD_METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 
 _METHODS = (*STANDARD_METHODS, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA)
 _MIB = 1 << 20
-_MAX_FILES = 100_000
+_MAX_FILES = 30_000
+"""The list of so many members takes a second or two to read; an FMU with an interpreter has some thousands."""
 _MAX_BYTES = 16 << 30
 _SUSPECT_BYTES, _SUSPECT_RATIO = 256 * _MIB, 200  # libraries and tables shrink to a tenth, rarely to a hundredth
 _MAX_REPORTED = 5
@@ -41,6 +42,8 @@ def archive_faults(members: Sequence[zipfile.ZipInfo], size: int) -> list[str]:
 
     There is a line for each kind of fault.
     """
+    if faults := _file_faults(len(members)):
+        return faults
     names = [m.orig_filename for m in members]
     plain = {path for n in names if not (path := _path(n)).endswith("/")}
     kinds: tuple[tuple[str, Iterable[str]], ...] = (
@@ -60,9 +63,11 @@ def archive_faults(members: Sequence[zipfile.ZipInfo], size: int) -> list[str]:
     ]
 
 
+def _file_faults(count: int) -> list[str]:
+    return [f"the archive holds {count} files; at most {_MAX_FILES} are unpacked"] if count > _MAX_FILES else []
+
+
 def _size_faults(members: Sequence[zipfile.ZipInfo], size: int) -> list[str]:
-    if len(members) > _MAX_FILES:
-        return [f"the archive holds {len(members)} files; at most {_MAX_FILES} are unpacked"]
     total = sum(m.file_size for m in members)
     if total > _MAX_BYTES:
         return [f"the archive would unpack to {total / 2**30:.0f} GiB; at most {_MAX_BYTES >> 30} GiB are unpacked"]
@@ -423,14 +428,36 @@ def _members(path: Path, kind: str) -> list[zipfile.ZipInfo]:
     try:
         with path.open("rb") as file:
             first_bytes = file.read(4)
+            count = _declared_count(file)
         if not zipfile.is_zipfile(path):
             raise InvalidFmu(path, _no_zip(first_bytes, kind))
+        if faults := _file_faults(count):  # before the list is read
+            raise InvalidFmu(path, faults[0])
         with zipfile.ZipFile(path) as z:
             return z.infolist()
     except PermissionError as e:
         raise InvalidFmu(path, "cannot be read: permission denied") from e
     except _DAMAGE as e:
         raise InvalidFmu(path, f"the archive is damaged: {one_line(e)}") from e
+
+
+_END, _END_64, _LOCATOR_64 = b"PK\x05\x06", b"PK\x06\x06", b"PK\x06\x07"
+
+
+def _declared_count(file: IO[bytes]) -> int:
+    """Return how many members the end of a zip archive says that it has; 0 where it is none."""
+    size = file.seek(0, os.SEEK_END)
+    file.seek(max(0, size - 22 - 0xFFFF))  # with the longest comment
+    tail = file.read()
+    end = tail.rfind(_END)
+    if end < 0 or len(tail) < end + 12:
+        return 0
+    count = int.from_bytes(tail[end + 10 : end + 12], "little")
+    if count == 0xFFFF and tail[max(0, end - 20) : end - 16] == _LOCATOR_64:
+        file.seek(min(size, int.from_bytes(tail[end - 12 : end - 4], "little")))
+        record = file.read(40)
+        count = int.from_bytes(record[32:40], "little") if record.startswith(_END_64) else count
+    return count
 
 
 def _no_zip(first_bytes: bytes, kind: str) -> str:

@@ -124,6 +124,19 @@ def declared(size: int, name: str = "a") -> zipfile.ZipInfo:
     return member
 
 
+@pytest.mark.parametrize("files", [40_000, 70_000])  # of over 65,535 the number is elsewhere in the archive
+def test_too_many_files_are_refused_before_their_list_is_read(
+    files: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    file = tmp_path / "a.fmu"
+    with zipfile.ZipFile(file, "w") as z:
+        for number in range(files):
+            z.writestr(f"{number}", "")
+    monkeypatch.delattr(zipfile, "ZipFile")
+    with pytest.raises(InvalidFmu, match=f"holds {files} files"):
+        FmuArchive(file)
+
+
 def test_a_zip_bomb_is_refused_by_what_it_declares(monkeypatch: pytest.MonkeyPatch, wording: Wording):
     wording.check(archive_faults([declared(1 << 30)], 1 << 20)[0])
     wording.check(archive_faults([declared(1 << 40)], 1 << 38)[0])
