@@ -100,7 +100,8 @@ class Record:
     """The signals of a run. `time` is in seconds, shape (rows,).
 
     Args:
-        path: a Parquet file with the column `time`, finite numbers, and others; all are numbers or booleans.
+        path: a Parquet file with the column `time`, finite numbers that do not descend, and others; all are numbers or
+            booleans.
 
     Raises:
         OSError: it cannot be read. InvalidRecord: it is damaged or no record.
@@ -117,6 +118,11 @@ class Record:
         self.time = self._values("time")
         if self.time.dtype != np.float64 or not np.isfinite(self.time).all():
             raise InvalidRecord(path, "its column 'time' has other values than finite numbers")
+        if (later := np.flatnonzero(np.diff(self.time) < 0.0)).size:
+            a, b = self.time[later[0] : later[0] + 2]
+            raise InvalidRecord(
+                path, f"in row {later[0] + 2} the time {b:g} s comes after {a:g} s: times must not descend"
+            )
         for signal in self.signals:
             self._check_metadata(path, signal)
 

@@ -58,6 +58,7 @@ def test_what_is_no_record_is_refused_where_it_is_opened(tmp_path: Path, wording
         {"time": [0.0, math.nan]},
         {"time": [[0.0], [1.0]]},
         {"time": [0, 1]},
+        {"time": [0.0, 0.2, 0.2, 0.1]},
         {"a.y": [0.0, 1.0]},
         {"time": [0.0, 1.0], "a.y": ["\x1b[31m", "x"]},
         {"time": [0.0, 1.0], "a.y": [None, True]},
