@@ -9,7 +9,7 @@ from types import TracebackType
 from typing import TypeVar
 
 from handover.cosim.check.run_faults import execution_tools, run_faults
-from handover.cosim.exceptions import InitializationError, InvalidFmu, UnitFailure, WiringError
+from handover.cosim.exceptions import InitializationError, InvalidFmu, ScheduleError, UnitFailure, WiringError
 from handover.cosim.fmu.calls import is_rounding
 from handover.cosim.fmu.failures import UnitCrashed, UnitHung, UnitTerminated
 from handover.cosim.fmu.file.archive import DESCRIPTION
@@ -27,6 +27,7 @@ from handover.cosim.stepping.ensemble import CleanupStack, Ensemble
 from handover.cosim.stepping.iteration import IterationCount
 from handover.cosim.stepping.options import MasterOptions
 from handover.cosim.stepping.stepper import Coupling, Stepper
+from handover.cosim.system.schedule import Schedule
 from handover.cosim.system.signals import ObserveAfter, Observer, Signals
 from handover.cosim.system.system import System
 
@@ -74,6 +75,17 @@ def _tell_of_faults(system: System, *, strict: bool) -> dict[Path, str]:
     return faults
 
 
+_MOST_STEPS = 10**12
+"""Steps of the fastest unit: at the fastest they take half a day, and their record has several terabytes."""
+
+
+def _check_steps(schedule: Schedule, stop: Fraction) -> None:
+    step = min((slot.every for slot in schedule.slots), default=1) * schedule.tick
+    if (stop - schedule.start) / step > _MOST_STEPS:
+        many = f"more than {_MOST_STEPS:g} steps of {float(step):g} s"
+        raise ScheduleError(f"until the stop time {float(stop):g} s there are {many}, too many to do")
+
+
 class Master:
     """Co-simulates a system of FMUs, each unit at its own rate. Use as a context manager.
 
@@ -88,7 +100,7 @@ class Master:
 
     Raises:
         WiringError: the system has faults. InvalidFmu: an FMU is invalid, see `MasterOptions.strict`.
-        ScheduleError: see `StepperFactory`.
+        ScheduleError: see `StepperFactory`; or there are more steps until the stop time than can be done.
         InitializationError: a unit did not accept its parameters or did not initialise.
         UnitHung: one did not return; UnitCrashed: an isolated one ended its process.
     """
@@ -111,6 +123,8 @@ class Master:
         self.stop = stop
         self._factory = StepperFactory(system, options)
         self.schedule = self._factory.schedule
+        if stop is not None:
+            _check_steps(self.schedule, stop)
         self.tolerances = self._factory.tolerances
         """By unit, the relative tolerance that it is given for its own solver; others choose theirs."""
         self.heartbeat = heartbeat or Heartbeat()

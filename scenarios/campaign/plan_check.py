@@ -141,7 +141,7 @@ def check_units(plan: CampaignPlan, fmus: Mapping[str, Path]) -> None:
     parameters, _ = split_parameters(type(instance), plan.texts(0))
     with scenario_code(instance):
         instance.evaluator(parameters)
-        instance.stop_time(parameters)
+        stop = instance.stop_time(parameters) if plan.stop is None else plan.stop
     first: dict[tuple[str, ...], int] = {}
     for number, point in enumerate(plan.points):
         first.setdefault(_chosen_units(plan, point), number)
@@ -149,7 +149,7 @@ def check_units(plan: CampaignPlan, fmus: Mapping[str, Path]) -> None:
         system = built_system(instance, parameters, plan.seed, plan.fmus(number, fmus), {})
         _check_unit_values(instance, system, plan, [p for p in plan.points if _chosen_units(plan, p) == chosen])
         record_variables(system, plan.recorded)
-        Master(system, plan.options)
+        Master(system, plan.options, stop=stop)
 
 
 def _check_unit_values(

@@ -14,7 +14,7 @@ from support.cosim.native_units import Edited, native_fmu
 from support.cosim.observed_rows import observed_rows
 from support.wording import Wording
 
-from handover.cosim.exceptions import InvalidOptions, UnitFailure, WiringError
+from handover.cosim.exceptions import InvalidOptions, ScheduleError, UnitFailure, WiringError
 from handover.cosim.master.master import Master
 from handover.cosim.record.reader import Record
 from handover.cosim.record.recorder import Recorder
@@ -45,6 +45,13 @@ def test_a_system_without_units_passes_through_time(options: MasterOptions, tmp_
     with Master(System(), options) as master, Recorder(tmp_path / "r.parquet") as recorder:
         master.run(Fraction(3, 2), [recorder])
     assert Record(tmp_path / "r.parquet").time.tolist() == [2.0]  # whole ticks, and a tick without units is 1 s
+
+
+def test_more_steps_than_can_be_done_are_refused(wording: Wording):
+    with pytest.raises(ScheduleError) as refused:
+        Master(ramp(), stop=Fraction(10) ** 300)
+    wording.check(refused.value)
+    Master(ramp(), stop=Fraction(10) ** 9)
 
 
 @all_ways
