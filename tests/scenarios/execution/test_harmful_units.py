@@ -152,10 +152,11 @@ def test_what_a_unit_has_forked_and_left_ends_with_the_command(bad: str, isolate
     while going.poll() is None:
         seen.update(family(going.pid))
         time.sleep(0.02)
+    status, _, errors = going.wait()
     left = [process for process in seen if lives(process)]
     for process in left:
-        os.kill(process, signal.SIGKILL)
-    status, _, errors = going.wait()
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(process, signal.SIGKILL)
     assert (status, errors, left) == (0, "", [])
     assert len(seen) > 1 + 3 * bool(isolate), "nothing was forked"
 
