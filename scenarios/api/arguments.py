@@ -47,13 +47,16 @@ class InvalidInput(ValueError):
 
 @contextmanager
 def errors_for_python(
-    named: Mapping[str, Any] | None = None, function: Callable[..., Any] | None = None
+    named: Mapping[str, Any] | None = None,
+    function: Callable[..., Any] | None = None,
+    elsewhere: Mapping[str, str] | None = None,
 ) -> Generator[None, None, None]:
     """Raise what is wrong with a call as InvalidInput, and other failures as they are.
 
     Args:
         named: keywords of the call that should be parameters.
         function: what was called, for whose arguments unknown ones of them may stand.
+        elsewhere: arguments of other functions that it has not, with what is right instead.
 
     Raises:
         InvalidInput: see there. UnitFailure: a unit failed before anything ran. RecordNotWritten: the disk is full.
@@ -64,7 +67,11 @@ def errors_for_python(
             yield
     except UsageError as e:
         unknown: Sequence[str] = e.__cause__.unknown if isinstance(e.__cause__, InvalidParameter) else ()
-        meant = [] if function is None else _meant_arguments([n for n in unknown if n in (named or ())], function)
+        meant = (
+            []
+            if function is None
+            else _meant_arguments([n for n in unknown if n in (named or ())], function, elsewhere or {})
+        )
         raise InvalidInput(visible("; ".join([_with_arguments(e.message), *meant]))) from e.__cause__
     except (UnitLost, RunNotWritten, WorkersLost) as e:
         cause = e.__cause__
@@ -75,13 +82,15 @@ _LIKE_AN_ARGUMENT = 0.7
 """How like an argument's name, of 1, an unknown keyword is that is taken for a misspelled one."""
 
 
-def _meant_arguments(unknown: Sequence[str], function: Callable[..., Any]) -> list[str]:
-    """Return a hint for each keyword that is no parameter and is like an argument's name."""
+def _meant_arguments(unknown: Sequence[str], function: Callable[..., Any], elsewhere: Mapping[str, str]) -> list[str]:
+    """Return a hint for each keyword that is no parameter, and is an argument elsewhere or like one's name."""
     own = {p.name: p.name for p in signature(function).parameters.values() if p.kind is Parameter.KEYWORD_ONLY}
     of_master = {f.name: f"options=handover.MasterOptions({f.name}=...)" for f in fields(MasterOptions)}
     arguments = {**(of_master if "options" in own else {}), **own}
-    near = {n: get_close_matches(n, arguments, 1, _LIKE_AN_ARGUMENT) for n in unknown}
-    return [f"if {n!r} is meant as an argument, {arguments[names[0]]} is right" for n, names in near.items() if names]
+    near = {n: get_close_matches(n, arguments, 1, _LIKE_AN_ARGUMENT) for n in unknown if n not in elsewhere}
+    return [f"{n}: {elsewhere[n]}" for n in unknown if n in elsewhere] + [
+        f"if {n!r} is meant as an argument, {arguments[names[0]]} is right" for n, names in near.items() if names
+    ]
 
 
 _ARGUMENTS = {

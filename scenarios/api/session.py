@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from handover.cosim.blocks.block import InvalidState
 from handover.cosim.blocks.start_values import fault_of
-from handover.cosim.exceptions import nearest, visible
+from handover.cosim.exceptions import first_faults, nearest, visible
 from handover.cosim.fmu.file.description import FmuPort
 from handover.cosim.master.checkpoint import Checkpoint, check_states, take_checkpoint
 from handover.cosim.master.master import Master
@@ -41,6 +41,7 @@ from handover.scenarios.execution.fmu_run import is_fmu
 from handover.scenarios.execution.request import RunRequest, check_subject
 from handover.scenarios.execution.ssp_run import is_ssp
 from handover.scenarios.experiment.experiment import Evaluator, Experiment, Outcome
+from handover.scenarios.experiment.parameters import text_of
 from handover.scenarios.results.tolerated_faults import GuardedEvaluator
 
 
@@ -55,6 +56,7 @@ class SavedState:
         asked: the time until which it was stepped, s.
         seen: the last time that the evaluation has seen, s; -inf before the first step.
         given: outputs of the unit that is left out which the evaluation sees.
+        settings: of the session: the scenario's parameters, and the start values of its units, as texts.
     """
 
     checkpoint: Checkpoint
@@ -63,6 +65,7 @@ class SavedState:
     asked: Fraction
     seen: float
     given: frozenset[str]
+    settings: Mapping[str, str]
 
 
 class Session:
@@ -91,6 +94,7 @@ class Session:
         self._evaluator: GuardedEvaluator[Evaluator] = GuardedEvaluator(experiment.bound_evaluator(parameters))
         self._evaluator.note_units(self._open.system.units)
         self._pushes = experiment.pushes(parameters)
+        self._settings = _settings(experiment, parameters, self._open.system)
         self._asked, self._seen = self._open.system.start, -math.inf
         self._master = Master(self._open.system, options)
         self._master.__enter__()
@@ -204,18 +208,21 @@ class Session:
         if (place := self._open.place) is not None:
             free |= {f"{place.unit.name}.{name}": views[0].copy() for name, views in place.outputs.items()}
         checkpoint = self._master.call_units(lambda: take_checkpoint(self._master, 0))
-        return SavedState(checkpoint, evaluator, free, self._asked, self._seen, frozenset(self._given))
+        return SavedState(checkpoint, evaluator, free, self._asked, self._seen, frozenset(self._given), self._settings)
 
     def restore(self, state: SavedState) -> None:
         """Go back to a state; the steps that follow are those that followed it, bit for bit.
 
         Raises:
-            InvalidInput: it is the state of another system. UnitFailure: a unit does not take it.
+            InvalidInput: it is the state of another system, or of one with other parameters, which are no part of the
+                state. Of another seed it is taken, as the state has the random numbers', unless that sets parameters.
+                UnitFailure: a unit does not take it.
             RuntimeError: a unit has ended the simulation.
         """
         if self._master.ended is not None:
             raise RuntimeError(f"{self._master.ended.summary}: open another session")
         of_type("state", state, SavedState, "what Session.save returned")
+        self._check_settings(state)
         with errors_for_python():
             self._master.call_units(lambda: state.checkpoint.restore(self._master))
         self._evaluator = GuardedEvaluator(self._evaluator.evaluator)
@@ -231,6 +238,18 @@ class Session:
         self._given = set(state.given)
         self._judged = self._judged_signals()
         self._asked, self._seen = state.asked, state.seen
+
+    def _check_settings(self, state: SavedState) -> None:
+        """Reject the state of a session of the same units with other parameters."""
+        if {*state.checkpoint.units} != {*self._open.system.units}:
+            return  # which the checkpoint tells
+        here, there, usual = self._settings, state.settings, "as usual"
+        if other := [name for name in {**here, **there} if here.get(name) != there.get(name)]:
+            values = [f"{n} was {there.get(n, usual):.40} and is {here.get(n, usual):.40}" for n in other]
+            same = "open a session with the same parameters and seed"
+            raise InvalidInput(
+                f"the state is of a session with other settings: {', '.join(first_faults(values))}; {same}"
+            )
 
     def close(self) -> None:
         """Terminate and free the units.
@@ -329,6 +348,14 @@ class Session:
         self._master.call_units(lambda: self._master.ensemble.instances[unit].set_start({port: value}))
 
 
+_OF_RUNS = {
+    "stop": "a session has no stop time; step(seconds) goes as far as it is asked to",
+    "inputs": 'a session has no table of inputs; s["unit.port"] = value sets them between steps',
+    "out": "a session writes no folder; handover.run does",
+}
+"""Arguments of `handover.run` that `open` has not, and what is right instead."""
+
+
 def open(  # noqa: A001 (handover.open is named like it)
     subject: str | Path | System | type[Experiment[Any]],
     /,
@@ -363,7 +390,7 @@ def open(  # noqa: A001 (handover.open is named like it)
         InvalidInput: something of it cannot be run, with all faults and what would be right.
         UnitFailure: a unit failed as it was loaded or initialised.
     """
-    with errors_for_python(named, open), contextlib.ExitStack() as opened:
+    with errors_for_python(named, open, _OF_RUNS), contextlib.ExitStack() as opened:
         name = str(subject) if isinstance(subject, Path) else subject
         check_subject(name)
         endless = isinstance(name, System) or (isinstance(name, str) and (is_ssp(name) or is_fmu(name)))
@@ -381,6 +408,17 @@ def open(  # noqa: A001 (handover.open is named like it)
         asked = request.open(opened)
         system = request.system(asked, request.seed, request.fmus(asked.experiment))
         return Session(asked.experiment, asked.parameters, system, request.options, place)
+
+
+def _settings(experiment: Experiment[Any], parameters: Any, system: System) -> dict[str, str]:
+    """Return the parameters of a scenario, and the start values of a system's units as `UNIT.NAME`, as texts.
+
+    Seeds are left out: what is drawn is part of a unit's state.
+    """
+    given = ((f"{u.name}.{name}", value) for u in system.units.values() for name, value in u.start.items())
+    starts = [(name, value) for name, value in given if not name.endswith(".seed")]
+    of_units = {name: repr(value.tolist() if hasattr(value, "tolist") else value) for name, value in starts}
+    return {v.name: text_of(v, getattr(parameters, v.name)) for v in experiment.parameters()} | of_units
 
 
 def _plain(value: Any) -> Any:

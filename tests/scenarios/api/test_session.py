@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -132,6 +133,32 @@ def test_the_whole_state_is_saved_and_restored():
                 again.step(1)
                 assert np.array_equal(again["navigation.p_WB_meas"], p_pushed)
                 assert again.outcome == outcome
+
+
+@pytest.mark.parametrize(
+    ("subject", "before", "after", "named"),
+    [
+        ("flyer_impedance", {"force": 3.0}, {}, ["force", "push.force"]),
+        ("ir_grasp", {"seed": 1}, {"seed": 2}, ["scene.p_WO_0"]),
+        (native_fmu("mass"), {"m": 2.0}, {}, ["mass.m"]),
+    ],
+)
+def test_a_state_of_a_session_with_other_parameters_is_refused(
+    subject: str | Path, before: dict[str, Any], after: dict[str, Any], named: list[str]
+):
+    with handover.open(subject, **before) as s:
+        state = s.save()
+    with handover.open(subject, **after) as s, pytest.raises(handover.InvalidInput) as refused:
+        s.restore(state)
+    assert all(f"{name} was " in str(refused.value) for name in named)
+
+
+@pytest.mark.parametrize("name", ["stop", "inputs", "out"])
+def test_arguments_of_runs_alone_are_told_as_such(name: str):
+    with pytest.raises(handover.InvalidInput) as refused:
+        handover.open(native_fmu("gain"), **dict[str, Any]({name: 1}))
+    assert f"; {name}: a session " in str(refused.value)
+    assert "is meant as" not in str(refused.value)
 
 
 def test_what_the_evaluation_sees_of_a_vacant_place_is_restored_too():
