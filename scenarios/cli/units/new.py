@@ -19,6 +19,7 @@ from handover.scenarios.results.run_folder import check_place, make_folder_of, w
 
 _TEMPLATES = Path(__file__).parent / "templates"
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+_LONGEST = 100
 
 _HELP = """Write a working start for a unit, a controller or a scenario of your own, with its test.
 
@@ -82,10 +83,12 @@ def _names(name: str) -> tuple[str, str]:
     """
     if not _NAME.fullmatch(name) or name.endswith("_"):
         raise UsageError(f"{name!r} is no name: letters, digits and underscores are right, such as TwoLinkArm")
+    if len(name) > _LONGEST:
+        raise UsageError(f"{name[:30]}...: {len(name)} letters; at most {_LONGEST} are right for names of files")
     module = re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", name).lower()
     class_name = name if name[0].isupper() else "".join(part.capitalize() for part in name.split("_"))
-    if keyword.iskeyword(module):
-        raise UsageError(f"{module!r} is a keyword of Python, which no module can be called")
+    if taken := [name for name in (module, class_name) if keyword.iskeyword(name)]:
+        raise UsageError(f"{taken[0]!r} is a keyword of Python, which no module or class can be called")
     if class_name in UNITS or module in SCENARIOS:
         raise UsageError(f"{name!r} is in the catalog already, see `handover list`; give another name")
     return class_name, module

@@ -80,6 +80,8 @@ def values(*given: str) -> tuple[str, ...]:
         pytest.param(("new", "unit", "TendonArm"), id="unit there"),
         pytest.param(("new", "unit", "my-arm"), id="no name"),
         pytest.param(("new", "controller", "class"), id="keyword"),
+        pytest.param(("new", "scenario", "None"), id="keyword as class"),
+        pytest.param(("new", "unit", "A" * 300), id="too long for a file"),
         pytest.param((*GENTLE, "helix_handover"), id="no place"),
         pytest.param((*GENTLE, "helix_handover:servos"), id="unknown place"),
         pytest.param((*GENTLE, "helix_handovers:servo"), id="unknown scenario"),
