@@ -100,6 +100,10 @@ def load(folder: Path | str) -> Run | Campaign:
     path = path_of("folder", folder)
     if CampaignFolder(path).is_there:
         return Campaign(path)
+    if path.is_file():
+        raise InvalidInput(
+            f"{path}: it is a file; the folder of a run or of a campaign is right, such as {path.parent}"
+        )
     if not _has_results(path):
         raise InvalidInput(f"{path} {OF_NEITHER}" if path.is_dir() else f"{path}: {nothing_at(path, _has_results)}")
     return Run(path)

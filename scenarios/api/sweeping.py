@@ -133,7 +133,9 @@ def sweep(
         plan = CampaignPlan(
             scenario=name,
             points=points,
-            fixed=set_parameters(experiment, fixed, points),
+            fixed=set_parameters(
+                experiment, fixed, points, "{0} takes one value, and {1} are several: a list varies it"
+            ),
             repetitions=whole_number("seeds", seeds, 1),
             seed=common.seed,
             paired=flag("paired", paired),

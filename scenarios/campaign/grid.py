@@ -43,9 +43,14 @@ def parse_grid(experiment: type[Experiment[Any]], given: Sequence[str]) -> list[
 
 
 def set_parameters(
-    experiment: type[Experiment[Any]], given: Sequence[str], varied: Sequence[Mapping[str, str]]
+    experiment: type[Experiment[Any]],
+    given: Sequence[str],
+    varied: Sequence[Mapping[str, str]],
+    several: str = "-p {0} takes one value; to vary it, give it without -p: {0}={1}",
 ) -> dict[str, str]:
     """Return the parameters that are the same at all points, in the order in which they are given.
+
+    `several` says what is right instead of several values, by name and text.
 
     Raises:
         InvalidParameter: one is unknown, given twice, varied, or given several values.
@@ -56,9 +61,9 @@ def set_parameters(
     known, settable = {v.name: v for v in experiment.parameters()}, settable_of(experiment)
     for name, text in fixed.items():
         port = None if settable is None else settable.port(name)
-        several = _is_list(known[name], text) if name in known else port is not None and _is_list_for(port, text)
-        if name not in both and several:
-            faults.append(f"-p {name} takes one value; to vary it, give it without -p: {name}={text}")
+        is_list = _is_list(known[name], text) if name in known else port is not None and _is_list_for(port, text)
+        if name not in both and is_list:
+            faults.append(several.format(name, text))
     if faults:
         raise InvalidParameter(faults)
     return fixed

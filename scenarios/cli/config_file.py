@@ -189,9 +189,9 @@ def read_config(path: Path, ctx: click.Context) -> ConfigFile:
 def _content(path: Path) -> dict[str, Any]:
     form, example = ("JSON", '{"seed": 3}') if path.suffix.lower() == ".json" else ("TOML", "seed = 3")
     try:
-        text = read_regular(path)
+        text = read_regular(path).decode("utf-8-sig")
         if form == "TOML":
-            return tomli.loads(text.decode())
+            return tomli.loads(text)
         content = decoded(text, dict[str, Any])
         json.loads(text, object_pairs_hook=_without_repeats)
         return content

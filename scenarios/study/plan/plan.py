@@ -216,7 +216,7 @@ def read_plan(path: Path) -> StudyPlan:
         InvalidPlan: it cannot be read, or with all its faults.
     """
     try:
-        text = read_regular(path).decode()
+        text = read_regular(path).decode("utf-8-sig")
     except OSError as e:
         raise InvalidPlan(path, [reading_fault(e)]) from e
     except ValueError as e:

@@ -194,6 +194,8 @@ CALLS: dict[str, Callable[[Any], object]] = {
     "report in words": lambda h: h.run("ir_grasp", report="no"),
     "progress in words": lambda h: h.run("ir_grasp", progress="no"),
     "paired in words": lambda h: h.sweep("ir_grasp", paired="no"),
+    "values in a text": lambda h: h.sweep("ir_grasp", strategy="reflex,blind"),
+    "values without order": lambda h: h.sweep("ir_grasp", strategy={"reflex"}),
     "values without end": lambda h: h.sweep("ir_grasp", forward=range(10**30)),
     "out that no file system takes": lambda h: h.run("ir_grasp", out="a\0b"),
     "flag of a text": lambda h: h.MasterOptions(strict="no"),
@@ -210,3 +212,10 @@ def test_what_cannot_be_run_is_told_in_one_sentence_and_nothing_is_written(
     wording.check(raised.value)
     assert "\n" not in str(raised.value)
     assert not any(tmp_path.iterdir())
+
+
+def test_a_file_in_a_run_s_folder_is_told_to_be_one(tmp_path: Path):
+    file = tmp_path / "run.json"
+    file.write_text("{}")
+    with pytest.raises(handover.InvalidInput, match="it is a file; the folder"):
+        handover.load(file)

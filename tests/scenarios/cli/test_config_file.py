@@ -59,6 +59,11 @@ def test_a_file_gives_what_is_run_and_the_options(tmp_path: Path):
     assert (got["parameters"], got["replaced"]) == (("on=true", "p=1,2.5"), ("arm=my:Arm",))
 
 
+@pytest.mark.parametrize(("name", "text"), [("run.toml", RUN), ("run.json", '{"scenario": "ir_grasp"}')])
+def test_a_file_may_begin_with_a_byte_order_mark(name: str, text: str, tmp_path: Path):
+    assert parsed(run_command, tmp_path, "\ufeff" + text, name=name)["scenario"] == "ir_grasp"
+
+
 def test_the_command_line_comes_first_of_tables_name_by_name(tmp_path: Path):
     text = RUN + '[unit]\nscene = "a.fmu"\nreflex = "b.fmu"\n'
     given = ("--seed", "7", "-p", "forward=0.1", "--unit", "reflex=c.fmu", "vsl_hybrid", "--format", "csv")

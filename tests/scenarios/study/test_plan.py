@@ -122,3 +122,8 @@ def test_a_plan_in_whose_rounds_nobody_can_lead_a_hand_is_told(wording: Wording)
     faults = hand_faults(parse_plan(default_plan().replace('"flyer_robot_to_human"', '"flyer_two_robots"')))
     assert len(faults) == 2
     wording.check("\n".join(faults))
+
+
+def test_a_plan_may_begin_with_a_byte_order_mark(tmp_path: Path):
+    (tmp_path / "plan.toml").write_text("\ufeff" + default_plan(), encoding="utf-8")
+    assert read_plan(tmp_path / "plan.toml") == parse_plan(default_plan())
