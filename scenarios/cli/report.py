@@ -29,7 +29,7 @@ With --runs, each run of a campaign gets its page, too, to which the campaign's 
     "file",
     metavar="FILE",
     type=click.Path(path_type=Path),
-    help="The page; a file of that name is replaced.  [default: DIR/report.html]",
+    help="The page, a name that ends with .html; a file of that name is replaced.  [default: DIR/report.html]",
 )
 def report(folder: Path, figures: bool, runs: bool, file: Path | None) -> None:
     """Write the page of a run or of a campaign."""
@@ -39,6 +39,8 @@ def report(folder: Path, figures: bool, runs: bool, file: Path | None) -> None:
         page = file or folder / "report.html"
         if page.is_dir():
             raise UsageError(f"{page} is a folder; name a file for the page")
+        if page.suffix.lower() != ".html":
+            raise UsageError(f"--out {page}: name a file for the page that ends with .html")
         require_extra("reports", "the page")
         check_place(page.parent)
         if figures:

@@ -32,6 +32,7 @@ check --timeout soon mass.fmu
 check mass.fmu missing.fmu here /dev/null
 report nothing
 report ran --out here
+report ran --out ran/run.json
 run helix_hand
 run helix_handover -p alfa=0.2
 run helix_handover -p alpha=7
