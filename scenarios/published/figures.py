@@ -103,6 +103,25 @@ class Bars:
 
 
 @dataclass(frozen=True)
+class Spans:
+    """Grey spans of published values: places, least and greatest; level ones go across the panel if of no width."""
+
+    spans: Sequence[tuple[float, float, float]]
+    width: float
+    label: str
+    upright: bool = True
+
+    def draw(self, axes: Axes) -> None:
+        """Draw them."""
+        for k, (x, low, high) in enumerate(self.spans):
+            style: dict[str, Any] = {"color": "#d5dae2", "lw": 0, "zorder": 0, "label": None if k else self.label}
+            if self.upright:
+                axes.bar(x, high - low, self.width, bottom=low, **style)
+            else:
+                axes.axvspan(low, high, **style)
+
+
+@dataclass(frozen=True)
 class Panel:
     """A panel: what is drawn into it, and what its axes are told by matplotlib's names.
 
@@ -193,8 +212,9 @@ def strips(
     caption: str,
     cases: Mapping[str, Sequence[Drawable]],
     axes: Mapping[str, Any],
-    key: Sequence[Mark] = (),
+    key: Sequence[Drawable] = (),
     x_ticks: Mapping[float, str] | None = None,
+    legend: int | None = 0,
 ) -> list[Figure]:
     """Draw a strip a case, from above: each of its marks is drawn with its y from the strip's middle; nothing of none.
 
@@ -203,13 +223,14 @@ def strips(
         caption: as of `drawn`.
         cases: marks by the case's label.
         axes: as of `Panel`.
-        key: what the legend below shows.
+        key: what is drawn besides, or shown in the legend below.
         x_ticks: as of `Panel`.
+        legend: as of `drawn`.
     """
     marks = [mark for k, of_case in enumerate(cases.values()) for mark in strip(k, of_case)]
     limits = {"ylim": (len(cases) - 0.4, -0.6), **axes}
-    panel = Panel([*marks, *key], limits, x_ticks, dict(enumerate(cases)))
-    return drawn(path, caption, [panel] if cases else [], size=(8.0, 1.4 + 0.27 * len(cases)))
+    panel = Panel([*key, *marks], limits, x_ticks, dict(enumerate(cases)))
+    return drawn(path, caption, [panel] if cases else [], size=(8.0, 1.4 + 0.27 * len(cases)), legend=legend)
 
 
 def strip(place: int, marks: Sequence[Drawable]) -> list[Drawable]:

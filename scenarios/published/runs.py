@@ -47,7 +47,14 @@ class Runs:
     def of_plan(
         cls, table: CampaignTable, plan: CampaignPlan, keep: Callable[[Row], bool], free: Sequence[str] = ()
     ) -> "Runs":
-        """Return the runs to keep; points are told apart by all parameters that the plan varies but the free ones."""
+        """Return the runs to keep; points are told apart by all parameters that the plan varies but the free ones.
+
+        Raises:
+            KeyError: the table has no column of a parameter that each point of the plan sets.
+        """
+        for name in plan.points[0]:
+            if name not in (*table.table.column_names, *free) and all(name in point for point in plan.points):
+                raise KeyError(name)
         starts = {v.name: plain(v.start) for v in plan.kind.parameters()}
         names = dict.fromkeys(name for point in plan.points for name in point if name not in free)
         return cls(filter(keep, table.rows), {name: starts.get(name) for name in names})

@@ -9,19 +9,20 @@ import numpy as np
 from scipy import stats
 
 from handover.cosim.blocks.ports import Floats
-from handover.cosim.record.reader import Record
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.statistics import LEVEL
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.display_unit import counted
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
-from handover.scenarios.experiment.plotting import COLOURS, figure
+from handover.scenarios.experiment.plotting import COLOURS
 from handover.scenarios.helix.parameters import HandPlace, Tuning
-from handover.scenarios.published.helix.helix_1_curves import errors_of
-from handover.scenarios.published.helix.helix_1_figures import draw_mean_error
-from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment, Verdict
-from handover.scenarios.published.verdicts import every_claim, format_p_value, nothing_measured
+from handover.scenarios.published.claims import Statement
+from handover.scenarios.published.figures import Mark, Panel, drawn, records_of
+from handover.scenarios.published.helix.helix_1_curves import error_marks, errors_of
+from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment
+from handover.scenarios.published.runs import Runs
+from handover.scenarios.published.verdicts import every_claim, format_p_value
 
 _PATIENCE = 600.0
 """Time by which the gripper must begin to close, s, as in `helix-1`."""
@@ -119,8 +120,8 @@ class Helix2(PublishedExperiment):
 
     def draw(self, table: CampaignTable, runs: Path, folder: Path) -> Sequence[Figure]:
         """Draw the error over time as in figs. 12 and 22, and what the person's hand does."""
-        drawn = [r for r in _runs(table) if r.guided and r.alone]
-        return [*_draw_errors(drawn, runs, folder), *_draw_hands(drawn, runs, folder)] if drawn else []
+        both = [r for r in _runs(table) if r.guided and r.alone]
+        return [*_draw_errors(both, runs, folder), *_draw_hands(both, runs, folder)] if both else []
 
 
 def _runs(table: CampaignTable) -> list[GuidedRuns]:
@@ -133,25 +134,23 @@ def _times(rows: Sequence[Mapping[str, Any]]) -> Floats:
 
 
 def _faster(runs: GuidedRuns) -> Claim:
-    facts: dict[str, Any] = {
-        "claim": f"At step size {runs.alpha} a guided handover is faster",
-        "published": "significantly faster (no figures)",
-        "where": f"sec. 4.3, {_FIGURES[runs.alpha]}",
-    }
+    says = Statement(
+        f"At step size {runs.alpha} a guided handover is faster",
+        f"sec. 4.3, {_FIGURES[runs.alpha]}",
+        "significantly faster (no figures)",
+    )
     guided, alone = _times(runs.guided), _times(runs.alone)
     if not len(guided) or not len(alone):
-        return nothing_measured(**facts, reason=f"Too few runs: {len(guided)} guided, {len(alone)} not.")
+        return says.unknown(f"Too few runs: {len(guided)} guided, {len(alone)} not.")
     least, p = _p_value(np.zeros(len(guided)), np.ones(len(alone))), _p_value(guided, alone)
-    holds = p < LEVEL and float(np.median(guided)) < float(np.median(alone))
     short = f" With so few runs p cannot be less than {format_p_value(least)}." if least >= LEVEL else ""
-    verdict = Verdict.REPRODUCED if holds else Verdict.NOT_REPRODUCED
-    return Claim(
-        **facts,
-        measured=f"{_seconds(guided)} against {_seconds(alone)} (medians)",
-        verdict=Verdict.NOT_COMPARABLE if least >= LEVEL else verdict,
-        reason="Reproduced if the guided runs' median is less and the exact test of Mann and Whitney, two-sided, "
-        f"rejects that the times are alike: p = {format_p_value(p)}, {counted(len(guided), 'run')} and {len(alone)}. "
+    return says.judged(
+        f"{_seconds(guided)} against {_seconds(alone)} (medians)",
+        p < LEVEL and float(np.median(guided)) < float(np.median(alone)),
+        "the guided runs' median is less and the exact test of Mann and Whitney, two-sided, rejects that the times are "
+        f"alike: p = {format_p_value(p)}, {counted(len(guided), 'run')} and {len(alone)}",
         f"A run that never closes the gripper counts as longer than any.{short}",
+        enough=least < LEVEL,
     )
 
 
@@ -174,53 +173,36 @@ def _cells(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     return [f"{len(closed)} of {len(rows)}", f"{taken} of {len(rows)}", shown, steps]
 
 
-def _draw_errors(drawn: Sequence[GuidedRuns], runs: Path, folder: Path) -> list[Figure]:
-    if not any(errors_of([*of_alpha.guided, *of_alpha.alone], runs) for of_alpha in drawn):
-        return []
-    with figure(folder / "errors", len(drawn), size=(8.0, 0.7 + 2.9 * len(drawn))) as axes:
-        for axis, of_alpha in zip(axes, drawn, strict=True):
-            for colour, label, rows in ((COLOURS[0], "alone", of_alpha.alone), (COLOURS[1], "guided", of_alpha.guided)):
-                if errors := errors_of(rows, runs):
-                    draw_mean_error(axis, errors, rows[0]["control_period"], (colour, label))
-            axis.set(ylabel="error (mm)", ylim=(0, None), xlim=(0, None), title=f"α = {of_alpha.alpha}")
-            axis.legend(loc="upper right")
-        axes[-1].set_xlabel("time (s)")
+def _draw_errors(drawn_runs: Sequence[GuidedRuns], runs: Path, folder: Path) -> list[Figure]:
+    panels: list[Panel] = []
+    for of_alpha in drawn_runs:
+        marks: list[Mark] = []
+        for colour, label, rows in ((COLOURS[0], "alone", of_alpha.alone), (COLOURS[1], "guided", of_alpha.guided)):
+            if errors := errors_of(Runs(rows, {}), runs):
+                marks += error_marks(errors, rows[0]["control_period"], colour, label)
+        axes = {"title": f"α = {of_alpha.alpha}", "xlabel": "time (s)", "ylabel": "error (mm)"}
+        panels += [Panel(marks, {**axes, "xlim": (0, None), "ylim": (0, None)})] if marks else []
     caption = (
         "Distance to the goal that the controller sees, over wrist and gripper, until the gripper begins to close, "
         "with guidance and without, like figs. 12 and 22. Thick: mean of the runs still under way, up to the median "
         "length, with its standard deviation; thin: the runs."
     )
-    return [Figure("errors", caption)]
+    return drawn(folder / "errors", caption, panels, size=(8.0, 0.9 + 2.9 * len(panels)))
 
 
-def _draw_hands(drawn: Sequence[GuidedRuns], runs: Path, folder: Path) -> list[Figure]:
-    records = [
-        (of_alpha.alpha, Record(path))
-        for of_alpha in drawn
-        for row in of_alpha.guided
-        if (path := runs / row["run"] / "signals.parquet").exists()
-    ]
-    if not records:
-        return []
-    with figure(folder / "guidance", 3, size=(8.0, 6.6)) as axes:
-        for alpha, record in records:
-            colour = COLOURS[[of_alpha.alpha for of_alpha in drawn].index(alpha)]
+def _draw_hands(drawn_runs: Sequence[GuidedRuns], runs: Path, folder: Path) -> list[Figure]:
+    labels = ("beside the ball (mm)", "above the ball (mm)", "force (N)")
+    marks: dict[str, list[Mark]] = {label: [] for label in labels}
+    for k, of_alpha in enumerate(drawn_runs):
+        for record in records_of([row["run"] for row in of_alpha.guided], runs):
             apart = 1000 * (record["arm.p_WG"] - record["hand.p_WO"])
-            curves = (
-                np.linalg.norm(apart[:, :2], axis=1),
-                apart[:, 2],
-                np.linalg.norm(record["hand.f_G"], axis=1),
-            )
-            for axis, values in zip(axes, curves, strict=True):
-                axis.plot(record.time, values, color=colour, lw=1.2)
-        axes[0].set_ylabel("beside the ball (mm)")
-        axes[1].set_ylabel("above the ball (mm)")
-        axes[2].set(ylabel="force (N)", xlabel="time (s)")
-        for k, of_alpha in enumerate(drawn):
-            axes[0].plot([], [], color=COLOURS[k], label=f"α = {of_alpha.alpha}")
-        axes[0].legend(loc="upper right")
+            force = np.linalg.norm(record["hand.f_G"], axis=1)
+            curves = (np.linalg.norm(apart[:, :2], axis=1), apart[:, 2], force)
+            for label, values in zip(labels, curves, strict=True):
+                marks[label].append(Mark(record.time, values, "-", COLOURS[k], f"α = {of_alpha.alpha}"))
+    panels = [Panel(of, {"ylabel": label, "xlabel": "time (s)"}) for label, of in marks.items() if of]
     caption = (
         "The guided runs: where the gripper is by the ball, and the force of the person's hand on it, by ground truth. "
         "Once the gripper has the ball, the force is the ball's weight."
     )
-    return [Figure("guidance", caption)]
+    return drawn(folder / "guidance", caption, panels, size=(8.0, 6.6))

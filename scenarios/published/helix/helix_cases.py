@@ -14,6 +14,10 @@ from handover.scenarios.campaign.plan import is_number
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.helix.helix_handover import HelixHandover
+from handover.scenarios.published.claims import Statement
+from handover.scenarios.published.published_experiment import Claim
+from handover.scenarios.published.runs import values_of
+from handover.scenarios.published.verdicts import MIN_FOR_EVERY
 
 OFFERED_AT = [
     {"azimuth": azimuth, "radius": radius, "height": height}
@@ -147,3 +151,26 @@ _SHORT = {
     "was pushed out of the hand": "pushed the ball out of the hand",
     "the cameras did not see": "ball or ring not seen",
 }
+
+
+NEAR = 0.005
+"""How near to the ball the gripper is to end, m."""
+
+
+def ends_near(when: str, taken: Sequence[Mapping[str, Any]]) -> Claim:
+    """Judge how far the gripper is from the ball at the end of handovers that succeeded.
+
+    Args:
+        when: circumstances, in words, with which the claim begins.
+        taken: rows of their runs.
+    """
+    says = Statement(f"{when} the gripper ends within {1e3 * NEAR:.0f} mm of the ball")
+    d = values_of(taken, "final_distance")
+    if not len(d):
+        return says.unknown("Too few runs: no handover succeeded.")
+    return says.judged(
+        f"{1e3 * np.median(d):.1f} mm in the median, {1e3 * d.max():.1f} mm at most",
+        bool(d.max() <= NEAR),
+        f"each of the {len(d)} handovers that succeeded ends so near, by ground truth",
+        runs=(len(d), MIN_FOR_EVERY),
+    )

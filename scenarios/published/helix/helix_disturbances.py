@@ -13,12 +13,13 @@ from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
-from handover.scenarios.experiment.plotting import COLOURS, figure
-from handover.scenarios.published.helix.helix_1_claims import ends_near
+from handover.scenarios.experiment.plotting import COLOURS
+from handover.scenarios.published.figures import Mark, strips
 from handover.scenarios.published.helix.helix_cases import (
     OFFERED_AT,
     Case,
     distances,
+    ends_near,
     levels_of,
     median_and_most,
     median_steps,
@@ -97,7 +98,8 @@ class HelixDisturbances(PublishedExperiment):
         """Judge whether mild disturbances are tolerated, and how near the gripper ends."""
         runs = [row for case, rows in rows_by_case(table, CASES).items() if case.mild for row in rows]
         taken = [row for row in runs if row["success"]]
-        return [_succeeds(runs), ends_near("With a mild disturbance", taken)]
+        tolerated = every_claim("The Helix succeeds with each mild disturbance", "", (0, 0), (len(taken), len(runs)))
+        return [tolerated, ends_near("With a mild disturbance", taken)]
 
     def tables(self, table: CampaignTable) -> Sequence[ComparisonTable]:
         """Return success, distance and steps by case, and why handovers failed."""
@@ -123,22 +125,20 @@ class HelixDisturbances(PublishedExperiment):
 
     def draw(self, table: CampaignTable, runs: Path, folder: Path) -> Sequence[Figure]:  # noqa: ARG002
         """Draw the final distances by case."""
-        cases = {case: rows for case, rows in rows_by_case(table, CASES).items() if rows}
-        with figure(folder / "disturbances", 1, size=(8.0, 1.2 + 0.24 * len(cases))) as (axes,):
-            for y, rows in enumerate(cases.values()):
-                taken, missed = (distances(rows, success) for success in (True, False))
-                axes.plot(1e3 * taken, np.full(len(taken), y), "o", ms=4, color=COLOURS[0], alpha=0.7)
-                axes.plot(1e3 * missed, np.full(len(missed), y), "x", ms=5, color=COLOURS[1])
-            axes.set_yticks(range(len(cases)), [case.label for case in cases])
-            axes.set(xscale="log", xlabel="gripper to ball at the end (mm)", ylim=(len(cases) - 0.4, -0.6))
-            axes.plot([], [], "o", ms=4, color=COLOURS[0], label="the gripper has the ball")
-            axes.plot([], [], "x", ms=5, color=COLOURS[1], label="it has not")
-            axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
+        cases: dict[str, Sequence[Mark]] = {}
+        for case, rows in rows_by_case(table, CASES).items():
+            if rows:
+                taken, missed = (1e3 * distances(rows, success) for success in (True, False))
+                cases[case.label] = (
+                    Mark(taken, np.zeros(len(taken)), "o", COLOURS[0], "the gripper has the ball"),
+                    Mark(missed, np.zeros(len(missed)), "x", COLOURS[1], "it has not"),
+                )
         caption = (
             "Distance of gripper and ball at the end, by ground truth, with one disturbance at a time: each point is a "
             "handover, all at the same places."
         )
-        return [Figure("disturbances", caption)]
+        axes = {"xscale": "log", "xlabel": "gripper to ball at the end (mm)"}
+        return strips(folder / "disturbances", caption, cases, axes)
 
 
 def _row(case: Case, rows: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -151,8 +151,3 @@ def _row(case: Case, rows: Sequence[Mapping[str, Any]]) -> list[str]:
         median_steps(rows),
         reasons_of(rows),
     ]
-
-
-def _succeeds(runs: Sequence[Mapping[str, Any]]) -> Claim:
-    succeeded = sum(bool(row["success"]) for row in runs)
-    return every_claim("The Helix succeeds with each mild disturbance", "", (0, 0), (succeeded, len(runs)))

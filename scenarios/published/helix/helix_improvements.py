@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from scipy import stats
@@ -15,7 +15,9 @@ from handover.scenarios.campaign.statistics import LEVEL
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.display_unit import counted
 from handover.scenarios.experiment.experiment import Figure
-from handover.scenarios.experiment.plotting import COLOURS, figure
+from handover.scenarios.experiment.plotting import COLOURS
+from handover.scenarios.published.claims import Statement
+from handover.scenarios.published.figures import Mark, strips
 from handover.scenarios.published.helix.helix_cases import (
     OFFERED_AT,
     Case,
@@ -25,8 +27,10 @@ from handover.scenarios.published.helix.helix_cases import (
     thesis_settings,
 )
 from handover.scenarios.published.helix.helix_places import random_places
-from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment, Verdict
-from handover.scenarios.published.verdicts import format_p_value, nothing_measured
+from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment
+from handover.scenarios.published.runs import Row
+from handover.scenarios.published.tables import table_of
+from handover.scenarios.published.verdicts import format_p_value
 
 _RANDOM_PLACES, _SEED = 12, 54
 """Where the ball is offered besides: the thesis's settings miss some, and the paired test needs six pairs."""
@@ -102,14 +106,9 @@ class HelixImprovements(PublishedExperiment):
         """Return every case at every place; if quick, a part of it."""
         quick_cases = [c for c in _CASES if c.parameters in ({}, _SIDE[2])]
         cases, offered = (quick_cases, places()[:2]) if quick else (_CASES, places())
-        return CampaignPlan(
-            scenario=self.scenario,
-            points=[{**place, **case.parameters} for case in cases for place in offered],
-            seed=_SEED,
-            paired=True,
-            scenes=tuple(OFFERED_AT[0]),
-            units={"arm": "TendonArmFast"},
-            experiment=self.name,
+        points = [{**place, **case.parameters} for case in cases for place in offered]
+        return self.campaign(
+            points, seed=_SEED, paired=True, scenes=tuple(OFFERED_AT[0]), units={"arm": "TendonArmFast"}
         )
 
     def claims(self, table: CampaignTable) -> Sequence[Claim]:
@@ -118,48 +117,42 @@ class HelixImprovements(PublishedExperiment):
 
     def tables(self, table: CampaignTable) -> Sequence[ComparisonTable]:
         """Return success, distance and steps with each change beside those without it."""
-        header = ["settings", "change", "sec.", "success", "closes at, mm", "p", "control steps", "failed because"]
         cells = [_row(x, *runs_of) for x, runs_of in _runs(table).items() if runs_of[1]]
         tried = max((len(before) for before, _ in _runs(table).values()), default=0)
         note = (
-            f"Without and with the change, at {counted(tried, 'place')} with the same seeds. Distance of gripper and "
+            f"Without and with the change, at {tried} places with the same seeds. Distance of gripper and "
             "ball, by ground truth, when the gripper begins to close, and control steps until then: medians over the "
             "places at which both did. p is that of Wilcoxon's signed-rank test of the distances."
         )
-        return [ComparisonTable(title="One change at a time", header=header, rows=cells, note=note)]
+        return [table_of("One change at a time", cells, note)]
 
     def draw(self, table: CampaignTable, runs: Path, folder: Path) -> Sequence[Figure]:  # noqa: ARG002
         """Draw the distances of each pair."""
-        drawn = [(x, pairs(*runs_of, "closing_distance")) for x, runs_of in _runs(table).items()]
-        drawn = [(x, d) for x, d in drawn if len(d)]
-        if not drawn:
-            return []
-        with figure(folder / "improvements", 1, size=(9.0, 1.2 + 0.3 * len(drawn))) as (axes,):
-            for y, (_, d) in enumerate(drawn):
-                for before, after in 1e3 * d:
-                    axes.plot([before, after], [y - 0.15, y + 0.15], "-", lw=0.7, color="0.7", zorder=1)
-                axes.plot(1e3 * d[:, 0], np.full(len(d), y - 0.15), "o", ms=4, color=COLOURS[0])
-                axes.plot(1e3 * d[:, 1], np.full(len(d), y + 0.15), "o", ms=4, color=COLOURS[1])
-            axes.set_yticks(range(len(drawn)), [f"{x.settings}: {x.what}" for x, _ in drawn])
-            axes.set(xscale="log", xlabel="distance at closing (mm)", ylim=(len(drawn) - 0.4, -0.6))
-            axes.set_xticks(_TICKS, [f"{x:g}" for x in _TICKS])
-            axes.minorticks_off()
-            axes.plot([], [], "o", ms=4, color=COLOURS[0], label="without")
-            axes.plot([], [], "o", ms=4, color=COLOURS[1], label="with the change")
-            axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
+        cases: dict[str, Sequence[Mark]] = {}
+        for change, runs_of in _runs(table).items():
+            d = 1e3 * pairs(*runs_of, "closing_distance")
+            if len(d):
+                beside = (-0.15, 0.15)
+                joined = [Mark(row, beside, "-", "0.7", style={"lw": 0.7, "zorder": 1}) for row in d]
+                ends = [
+                    Mark(d[:, k], np.full(len(d), y), "o", COLOURS[k], label)
+                    for k, (y, label) in enumerate(zip(beside, ("without", "with the change"), strict=True))
+                ]
+                cases[f"{change.settings}: {change.what}"] = [*joined, *ends]
         caption = (
             "Distance of gripper and ball when the gripper begins to close, by ground truth; lines join a place's."
         )
-        return [Figure("improvements", caption)]
+        axes = {"xscale": "log", "xlabel": "distance at closing (mm)"}
+        return strips(folder / "improvements", caption, cases, axes, x_ticks={x: f"{x:g}" for x in _TICKS})
 
 
-def _runs(table: CampaignTable) -> dict[Change, tuple[Sequence[Mapping[str, Any]], Sequence[Mapping[str, Any]]]]:
+def _runs(table: CampaignTable) -> dict[Change, tuple[Sequence[Row], Sequence[Row]]]:
     """Return the runs without and with each change."""
     found = {_key(case): rows for case, rows in rows_by_case(table, _CASES).items()}
     return {x: (found[_key(x.without)], found[_key(x.changed)]) for x in CHANGES}
 
 
-def pairs(before: Sequence[Mapping[str, Any]], after: Sequence[Mapping[str, Any]], metric: str) -> Floats:
+def pairs(before: Sequence[Row], after: Sequence[Row], metric: str) -> Floats:
     """Return a metric's values without and with a change, shape (n, 2), of the places at which both have it."""
     place = tuple(OFFERED_AT[0])
     changed = {tuple(row[name] for name in place): row for row in after}
@@ -177,42 +170,39 @@ def _p_value(d: Floats) -> float:
     return float(stats.wilcoxon(difference).pvalue) if np.any(difference) else 1.0
 
 
-def _row(change: Change, before: Sequence[Mapping[str, Any]], after: Sequence[Mapping[str, Any]]) -> list[str]:
+def _row(change: Change, before: Sequence[Row], after: Sequence[Row]) -> dict[str, str]:
     d, steps = (pairs(before, after, metric) for metric in ("closing_distance", "steps"))
-    return [
-        change.settings,
-        change.what,
-        change.section,
-        f"{rate(before)} → {rate(after)}",
-        " → ".join(f"{1e3 * x:.1f}" for x in np.median(d, axis=0)) if len(d) else "",
-        format_p_value(_p_value(d)) if len(d) else "",
-        " → ".join(f"{x:.0f}" for x in np.median(steps, axis=0)) if len(steps) else "",
-        reasons_of(after),
-    ]
-
-
-def _closes_nearer(change: Change, before: Sequence[Mapping[str, Any]], after: Sequence[Mapping[str, Any]]) -> Claim:
-    facts: dict[str, Any] = {
-        "claim": f"With {change.settings}, the gripper closes nearer to the ball: {change.what}",
-        "published": "suggested",
-        "where": f"sec. {change.section}",
+    return {
+        "settings": change.settings,
+        "change": change.what,
+        "sec.": change.section,
+        "success": f"{rate(before)} → {rate(after)}",
+        "closes at, mm": " → ".join(f"{1e3 * x:.1f}" for x in np.median(d, axis=0)) if len(d) else "",
+        "p": format_p_value(_p_value(d)) if len(d) else "",
+        "control steps": " → ".join(f"{x:.0f}" for x in np.median(steps, axis=0)) if len(steps) else "",
+        "failed because": reasons_of(after),
     }
+
+
+def _closes_nearer(change: Change, before: Sequence[Row], after: Sequence[Row]) -> Claim:
+    says = Statement(
+        f"With {change.settings}, the gripper closes nearer to the ball: {change.what}",
+        f"sec. {change.section}",
+        "suggested",
+    )
     if not (before and after):
-        return nothing_measured(**facts, reason="It was not tried.")
+        return says.unknown("It was not tried.")
     d = pairs(before, after, "closing_distance")
     if not len(d):
-        return nothing_measured(**facts, reason="At no place did the gripper close both without and with it.")
-    p, least = _p_value(d), 2.0 ** (1 - len(d))
+        return says.unknown("At no place did the gripper close both without and with it.")
+    p, least, medians = _p_value(d), 2.0 ** (1 - len(d)), 1e3 * np.median(d, axis=0)
     successes = [sum(bool(row["success"]) for row in rows) for rows in (before, after)]
-    medians = 1e3 * np.median(d, axis=0)
-    holds = p < LEVEL and medians[1] < medians[0] and successes[1] >= successes[0]
-    verdict = Verdict.REPRODUCED if holds else Verdict.NOT_REPRODUCED
-    return Claim(
-        **facts,
-        measured=f"{medians[0]:.1f} mm without, {medians[1]:.1f} mm with it; "
+    return says.judged(
+        f"{medians[0]:.1f} mm without, {medians[1]:.1f} mm with it; "
         f"{successes[0]} of {len(before)} and {successes[1]} of {len(after)} succeed",
-        verdict=Verdict.NOT_COMPARABLE if least >= LEVEL else verdict,
-        reason="Reproduced if the median distance is less, Wilcoxon's signed-rank test of the pairs, two-sided, "
-        f"rejects that nothing changes (p = {format_p_value(p)}, {counted(len(d), 'pair')}; "
-        f"{format_p_value(least)} at least), and no fewer handovers succeed.",
+        p < LEVEL and bool(medians[1] < medians[0]) and successes[1] >= successes[0],
+        "the median distance is less, Wilcoxon's signed-rank test of the pairs, two-sided, rejects that nothing "
+        f"changes (p = {format_p_value(p)}, {counted(len(d), 'pair')}; {format_p_value(least)} at least), and no fewer "
+        "handovers succeed",
+        enough=least < LEVEL,
     )

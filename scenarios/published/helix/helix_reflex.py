@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -12,19 +12,20 @@ from handover.scenarios.campaign.statistics import LEVEL, paired_difference, pai
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.display_unit import counted
 from handover.scenarios.experiment.experiment import Figure
-from handover.scenarios.experiment.plotting import COLOURS, figure
-from handover.scenarios.helix.reflex_grasp_parameters import ReflexGraspParameters
+from handover.scenarios.experiment.plotting import COLOURS
+from handover.scenarios.published.claims import Statement
+from handover.scenarios.published.figures import Mark, Panel, drawn
 from handover.scenarios.published.helix.helix_cases import reasons_of
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment
+from handover.scenarios.published.runs import Point, Row, Runs
+from handover.scenarios.published.tables import table_of
 from handover.scenarios.published.verdicts import (
     format_median,
     format_p_value,
     format_rate,
     format_share,
     no_worse_claim,
-    nothing_measured,
     order_claim,
-    verdict_of,
 )
 
 _COUNT, _QUICK_COUNT = 40, 2
@@ -45,13 +46,8 @@ MISMATCHES: Mapping[str, Mapping[str, str]] = {
     },
 }
 """What the reflex does not expect, one thing at a time; its ball has 25 mm, its palm 0.6 of the reference's light."""
-_USUAL = ReflexGraspParameters()
-_OF_MODEL = tuple(dict.fromkeys(name for values in MISMATCHES.values() for name in values))
 _MIN_PAIRS = next(n for n in range(1, 64) if 2.0 ** (1 - n) < LEVEL)
 """Pairs of which Wilcoxon's signed-rank test, two-sided, can reject."""
-
-Row = Mapping[str, Any]
-Rows = Sequence[Row]
 
 
 class HelixReflex(PublishedExperiment):
@@ -69,9 +65,8 @@ class HelixReflex(PublishedExperiment):
 
     def plan(self, quick: bool) -> CampaignPlan:
         """Return every case with every seed; if quick, with two of them."""
-        return CampaignPlan(
-            scenario=self.scenario,
-            points=[
+        return self.campaign(
+            [
                 *({"cameras": c, "reflex": r} for c in CAMERAS for r in ("true", "false")),
                 *({"cameras": "covered", "reflex": "true", **values} for values in MISMATCHES.values()),
             ],
@@ -79,7 +74,6 @@ class HelixReflex(PublishedExperiment):
             seed=_SEED,
             paired=True,
             units={"arm": "TendonArmFast"},
-            experiment=self.name,
         )
 
     def claims(self, table: CampaignTable) -> Sequence[Claim]:
@@ -104,55 +98,52 @@ class HelixReflex(PublishedExperiment):
 
     def tables(self, table: CampaignTable) -> Sequence[ComparisonTable]:
         """Return success, offsets and tests by what the cameras see."""
-        header = [
-            *("cameras", "reflex", "success", "closed", "beside the axis, mm", "along it, mm", "belief's error, mm"),
-            *("as the ball left the hand, mm", "failed because"),
-        ]
-        cells = [
-            [CAMERAS[c], "with" if r else "without", *_figures_of(of_case(table, c, r))]
-            for c in CAMERAS
-            for r in (True, False)
-        ]
         tests = " ".join(_tests(CAMERAS[c], pairs(table, c)) for c in CAMERAS)
-        note = (
-            "Medians, with intervals by bootstrap, of the runs in which the gripper closed. They are the ball's offset "
-            "beside and along the gripper's axis as it began to close, by ground truth, and the controller's error of "
-            f"that; then the offset beside the axis as the ball left the hand. {tests}"
-        )
+        cases: Mapping[str, str | None] = {"all as expected, but for tolerances": None, **{m: m for m in MISMATCHES}}
         return [
-            ComparisonTable(title="With and without the reflex", header=header, rows=cells, note=note),
-            _table_of_mismatches(table),
+            table_of(
+                "With and without the reflex",
+                [
+                    {"cameras": CAMERAS[c], "reflex": "with" if r else "without", **_cells(of_case(table, c, r))}
+                    for c in CAMERAS
+                    for r in (True, False)
+                ],
+                "Medians, with intervals by bootstrap, of the runs in which the gripper closed: the ball's offset "
+                "beside and along the gripper's axis as it began to close, by ground truth, and the controller's error "
+                f"of that; then the offset beside the axis as the ball left the hand. {tests}",
+            ),
+            table_of(
+                "A model that is wrong",
+                [
+                    {"what the reflex does not expect": label, **_cells(of_case(table, "covered", True, m))}
+                    for label, m in cases.items()
+                ],
+                "Cameras covered within 50 mm, with the reflex; figures as above. Of its sensors the reflex knows the "
+                "design: gain and range of each are 5 % off, directions 0.03 rad (1.7°) in each of two (one standard "
+                "deviation).",
+            ),
         ]
 
     def draw(self, table: CampaignTable, runs: Path, folder: Path) -> Sequence[Figure]:  # noqa: ARG002
         """Draw the offset of each pair."""
-        with figure(folder / "reflex", 1, len(CAMERAS), size=(9.0, 3.6)) as axes:
-            for axis, (c, label) in zip(axes, CAMERAS.items(), strict=True):
-                both = 1e3 * offsets(pairs(table, c))
-                for without, by_reflex in both:
-                    axis.plot([0, 1], [without, by_reflex], "-", lw=0.7, color="0.7", zorder=1)
-                for k, colour in enumerate(COLOURS[:2]):
-                    axis.plot(np.full(len(both), k), both[:, k], "o", ms=4, color=colour)
-                axis.set_xticks([0, 1], ["without", "by reflex"])
-                axis.set(title=f"cameras {label}", xlim=(-0.4, 1.4))
-            top = max(axis.get_ylim()[1] for axis in axes)
-            for axis in axes:
-                axis.set_ylim(0.0, top)
-            axes[0].set(ylabel="ball beside the gripper's axis (mm)")
+        panels: list[Panel] = []
+        for c, label in CAMERAS.items():
+            both = 1e3 * offsets(pairs(table, c))
+            marks = [Mark([0, 1], pair, "-", "0.7", style={"lw": 0.7, "zorder": 1}) for pair in both]
+            marks += [Mark(np.full(len(both), k), both[:, k], "o", COLOURS[k]) for k in (0, 1)]
+            axes = {"title": f"cameras {label}", "ylabel": "ball beside the gripper's axis (mm)", "ylim": (0.0, None)}
+            panels.append(Panel(marks, {**axes, "xlim": (-0.4, 1.4)}, {0: "without", 1: "by reflex"}))
         caption = (
             "Where the ball was beside the gripper's axis when the gripper began to close, by ground truth; lines join "
             "runs of one seed in which it did both times."
         )
-        return [Figure("reflex", caption)]
+        return drawn(folder / "reflex", caption, panels, 2, size=(9.0, 3.6), same_height=True)
 
 
-def of_case(table: CampaignTable, cameras: str, reflex: bool, mismatch: str | None = None) -> Rows:
+def of_case(table: CampaignTable, cameras: str, reflex: bool, mismatch: str | None = None) -> Runs:
     """Return the runs of a case that came to their end, by what the reflex does not expect; None: nothing."""
-    expected: Mapping[str, str] = {} if mismatch is None else MISMATCHES[mismatch]
-    model = [float(expected[name] if name in expected else getattr(_USUAL, name)) for name in _OF_MODEL]
-    rows = [row for row in table.rows if row["status"] == "done"]
-    rows = [row for row in rows if [_setting(row, name) for name in _OF_MODEL] == model]
-    return [row for row in rows if row["cameras"] == cameras and str(row["reflex"]).lower() == str(reflex).lower()]
+    expected: Point = {} if mismatch is None else MISMATCHES[mismatch]
+    return HelixReflex().runs(table).of({"cameras": cameras, "reflex": str(reflex).lower(), **expected})
 
 
 def pairs(table: CampaignTable, cameras: str, mismatch: str | None = None) -> Sequence[tuple[Row, Row]]:
@@ -178,84 +169,59 @@ def _value(row: Row, name: str) -> float:
     return np.nan if value is None else float(value)
 
 
-def _setting(row: Row, name: str) -> float:
-    """Return a parameter's value; a table of points that do not set it lacks its column."""
-    value = row.get(name)
-    return float(getattr(_USUAL, name) if value is None else value)
-
-
 def _centres(claim: str, of_pairs: Sequence[tuple[Row, Row]]) -> Claim:
-    d = offsets(of_pairs)
+    says, d = Statement(claim), offsets(of_pairs)
     test = paired_difference(d[:, 0], d[:, 1])
     if test is None:
-        return nothing_measured(claim, beyond=True, reason="In no pair of runs did the gripper close both times.")
+        return says.unknown("In no pair of runs did the gripper close both times.")
     medians = 1e3 * np.median(d, axis=0)
-    return Claim(
-        claim=claim,
-        published="",
-        measured=f"{medians[0]:.1f} mm without, {medians[1]:.1f} mm with it, in the median",
-        interval=None if test.interval is None else (test.interval.low, test.interval.high),
+    return says.judged(
+        f"{medians[0]:.1f} mm without, {medians[1]:.1f} mm with it, in the median",
+        test.p < LEVEL and test.difference < 0.0,
+        f"Wilcoxon's signed-rank test, two-sided, of {counted(len(d), 'pair')} in which the gripper closed both times "
+        f"rejects that nothing changes (p = {format_p_value(test.p)}) and the median of the differences is below 0",
+        f"The interval is that median's. Of {counted(len(of_pairs), 'pair')} the others say nothing here.",
+        enough=len(d) >= _MIN_PAIRS,
+        interval=test.interval,
         unit="m",
-        verdict=verdict_of(test.p < LEVEL and test.difference < 0.0, could_be_either=len(d) >= _MIN_PAIRS),
-        reason=f"Holds if Wilcoxon's signed-rank test, two-sided, of {counted(len(d), 'pair')} in which the "
-        f"gripper closed both times rejects that nothing changes (p = {format_p_value(test.p)}) and the median "
-        f"of the differences is below 0. The interval is that median's. Of {counted(len(of_pairs), 'pair')} the "
-        "others say nothing here.",
-        beyond=True,
     )
 
 
 def _in_spite_of_mismatches(of_pairs: Mapping[str, Sequence[tuple[Row, Row]]]) -> Claim:
     claim = "With covered cameras the ball is nearer to the axis by the reflex, too, with each mismatch of its model"
-    both_closed = {title: offsets(both) for title, both in of_pairs.items()}
-    tests = {title: paired_difference(d[:, 0], d[:, 1]) for title, d in both_closed.items()}
+    says, closed = Statement(claim), {title: offsets(both) for title, both in of_pairs.items()}
+    tests = {title: paired_difference(d[:, 0], d[:, 1]) for title, d in closed.items()}
     found = {title: test for title, test in tests.items() if test is not None}
     if len(found) < len(of_pairs):
-        return nothing_measured(claim, beyond=True, reason="Not with each was there a pair that closed both times.")
+        return says.unknown("Not with each was there a pair that closed both times.")
     worst = max(found, key=lambda title: (found[title].difference >= 0.0, found[title].p))
-    before, after = 1e3 * np.median(both_closed[worst], axis=0)
-    return Claim(
-        claim=claim,
-        published="",
-        measured=f"{worst}: {after:.1f} mm ({before:.1f} without)",
-        verdict=verdict_of(
-            all(test.p < LEVEL and test.difference < 0.0 for test in found.values()),
-            could_be_either=min(map(len, both_closed.values())) >= _MIN_PAIRS,
-        ),
-        reason="Medians of the least clear; the table has all. Holds if for each of them Wilcoxon's signed-rank test, "
-        f"two-sided, rejects at {format_share(LEVEL)}, and the median of the differences is below 0; as all must, no "
-        f"correction is needed. Of the least clear there are {counted(len(both_closed[worst]), 'pair')}, p = "
-        f"{format_p_value(found[worst].p)}.",
-        beyond=True,
+    medians = {title: 1e3 * np.median(d, axis=0) for title, d in closed.items()}
+    return says.judged(
+        "; ".join(f"{title}: {by:.1f} mm ({without:.1f} without)" for title, (without, by) in medians.items()),
+        all(test.p < LEVEL and test.difference < 0.0 for test in found.values()),
+        f"for each of them Wilcoxon's signed-rank test, two-sided, rejects at {format_share(LEVEL)}, and the median of "
+        "the differences is below 0; as all must, no correction is needed",
+        f"Least clear: {worst}, {counted(len(closed[worst]), 'pair')}, p = {format_p_value(found[worst].p)}.",
+        enough=min(map(len, closed.values())) >= _MIN_PAIRS,
     )
 
 
-def _table_of_mismatches(table: CampaignTable) -> ComparisonTable:
-    cases: Mapping[str, str | None] = {"all as expected, but for tolerances": None, **{m: m for m in MISMATCHES}}
-    header = ["what the reflex does not expect", "success", "closed", "beside the axis, mm", "along it, mm"]
-    header += ["belief's error, mm", "as the ball left the hand, mm", "failed because"]
-    cells = [[label, *_figures_of(of_case(table, "covered", True, m))] for label, m in cases.items()]
-    note = (
-        "Cameras covered within 50 mm, with the reflex; figures as above. Of its sensors the reflex knows the design: "
-        "gain and range of each are 5 % off, directions 0.03 rad (1.7°) in each of two (one standard deviation)."
-    )
-    return ComparisonTable(title="A model that is wrong", header=header, rows=cells, note=note)
-
-
-def _figures_of(rows: Rows) -> list[str]:
+def _cells(runs: Runs) -> dict[str, str]:
     """Return success, how many closed, medians of the offsets in mm, and reasons of failure; empty without runs."""
-    if not rows:
-        return [""] * 7
-    closed = [row for row in rows if np.isfinite(_value(row, OFFSET))]
-    medians = [
-        format_median(1e3 * x[np.isfinite(x)], 1)
-        for x in (
-            np.array([_value(row, name) for row in closed])
-            for name in (OFFSET, "closing_offset_axial", "felt_error", "grasp_offset_lateral")
-        )
-    ]
-    taken = format_rate(sum(bool(row["success"]) for row in rows), len(rows))
-    return [taken, f"{len(closed)}", *medians, reasons_of(rows)]
+    offs = {
+        "beside the axis, mm": OFFSET,
+        "along it, mm": "closing_offset_axial",
+        "belief's error, mm": "felt_error",
+        "as the ball left the hand, mm": "grasp_offset_lateral",
+    }
+    closed = runs.where(lambda row: bool(np.isfinite(_value(row, OFFSET))))
+    medians = {head: 1e3 * closed.metric(name) for head, name in offs.items()}
+    return {
+        "success": format_rate(*runs.count) if len(runs) else "",
+        "closed": f"{len(closed)}" if len(runs) else "",
+        **{head: format_median(x[np.isfinite(x)], 1) for head, x in medians.items()},
+        "failed because": reasons_of(runs.rows),
+    }
 
 
 def _tests(label: str, of_pairs: Sequence[tuple[Row, Row]]) -> str:

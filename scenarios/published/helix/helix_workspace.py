@@ -1,13 +1,14 @@
 """Where the Helix can take a ball: how far it reaches, and what its cameras see, as in fig. 14 of [Vervloet2025]."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
-from matplotlib.patches import Patch
 
 from handover.controllers.helix.servo.servo_parameters import Params as ServoParams
 from handover.cosim.blocks.ports import Floats
@@ -15,10 +16,13 @@ from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.display_unit import counted
 from handover.scenarios.experiment.experiment import Figure
-from handover.scenarios.experiment.plotting import COLOURS, figure
+from handover.scenarios.experiment.plotting import COLOURS
 from handover.scenarios.helix.workspace import cameras_that_see, reach
-from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment, Verdict
-from handover.scenarios.published.verdicts import nothing_measured
+from handover.scenarios.published.claims import Statement
+from handover.scenarios.published.figures import Drawable, Mark, Panel, drawn
+from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment
+from handover.scenarios.published.runs import Row, is_done
+from handover.scenarios.published.tables import table_of
 
 AZIMUTHS = (0.0, 1.05, 1.57, 3.14, -1.57)
 """Directions from the axis, rad: along tendons, between two, and across."""
@@ -50,8 +54,7 @@ class HelixWorkspace(PublishedExperiment):
         """Return a grid of places; if quick, a part of it."""
         places = product(*(_QUICK if quick else (AZIMUTHS, HEIGHTS, RADII)))
         points = [{"azimuth": str(a), "height": str(z), "radius": str(r)} for a, z, r in places]
-        units = {"arm": "TendonArmFast"}
-        return CampaignPlan(scenario=self.scenario, points=points, units=units, experiment=self.name)
+        return self.campaign(points, units={"arm": "TendonArmFast"})
 
     def claims(self, table: CampaignTable) -> Sequence[Claim]:
         """Judge what the thesis says limits the workspace, and whether the reach that is kept is the one found."""
@@ -62,54 +65,47 @@ class HelixWorkspace(PublishedExperiment):
         found = reach_by_place(table)
         azimuths, heights = sorted({a for a, _ in found}), sorted({z for _, z in found}, reverse=True)
         rows = [
-            [f"{z:.2f}", *(f"{found[a, z]:.2f}" if (a, z) in found else "" for a in azimuths), f"{reach(z):.2f}"]
+            {
+                "height, m": f"{z:.2f}",
+                **{f"{np.degrees(a):.0f}°": f"{found[a, z]:.2f}" if (a, z) in found else "" for a in azimuths},
+                "kept": f"{reach(z):.2f}",
+            }
             for z in heights
         ]
-        return [
-            ComparisonTable(
-                title="How far the arm reaches",
-                header=["height, m", *(f"{np.degrees(a):.0f}°" for a in azimuths), "kept"],
-                rows=rows,
-                note="Largest distance from the arm's axis, m, up to which the gripper settles within "
-                f"{_SETTLED} of every tried place, tilted by {_TILTED} at most, by direction. Kept is what warns "
-                "before a handover: the least of all directions.",
-            )
-        ]
+        note = (
+            "Largest distance from the arm's axis, m, up to which the gripper settles within "
+            f"{_SETTLED} of every tried place, tilted by {_TILTED} at most, by direction. Kept is what warns before a "
+            "handover: the least of all directions."
+        )
+        return [table_of("How far the arm reaches", rows, note)]
 
     def draw(self, table: CampaignTable, runs: Path, folder: Path) -> Sequence[Figure]:  # noqa: ARG002
         """Draw the planes before the cameras and across their view: what is seen, and what is reached."""
-        rows = [row for row in table.rows if row["status"] == "done"]
-        if not rows:
-            return []
-        with figure(folder / "workspace", 1, 2, size=(8.0, 3.5)) as panels:
-            for axes, (title, name, turn) in zip(
-                panels, (("along the cameras' view", "x", 0.0), ("across it", "y", np.pi / 2)), strict=True
-            ):
-                _shade(axes, turn)
-                for reached, (form, colour) in {True: ("o", COLOURS[0]), False: ("x", COLOURS[1])}.items():
-                    tried = [_in_plane(row, turn) for row in rows if bool(row["success"]) is reached]
-                    points = [p for p in tried if p is not None]
-                    axes.plot([p[0] for p in points], [p[1] for p in points], form, ms=4, color=colour)
-                axes.set(title=title, xlabel=f"{name} (m)", ylabel="z (m)", aspect="equal")
-            panels[0].plot([], [], "o", ms=4, color=COLOURS[0], label="reached")
-            panels[0].plot([], [], "x", ms=4, color=COLOURS[1], label="not reached")
-            handles, labels = panels[0].get_legend_handles_labels()
-            handles += [Patch(color=shade) for shade in reversed(_SHADES)]
-            canvas: Any = panels[0].get_figure(root=True)
-            canvas.legend(handles, [*labels, *reversed(_SEEN)], loc="outside lower center", ncols=5)
+        rows = [row for row in table.rows if is_done(row)]
+        panels: list[Panel] = []
+        for title, name, turn in (("along the cameras' view", "x", 0.0), ("across it", "y", np.pi / 2)):
+            marks: list[Drawable] = [_Seen(turn)]
+            for k, (reached, form) in enumerate(((True, "o"), (False, "x"))):
+                tried = [_in_plane(row, turn) for row in rows if bool(row["success"]) is reached]
+                points = [p for p in tried if p is not None]
+                x, z = [p[0] for p in points], [p[1] for p in points]
+                marks.append(Mark(x, z, form, COLOURS[k], "reached" if reached else "not reached"))
+            marks += [Mark(form="s", colour=c, label=n) for c, n in zip(_SHADES, _SEEN, strict=True)]
+            axes = {"title": title, "xlabel": f"{name} (m)", "ylabel": "z (m)", "aspect": "equal"}
+            panels.append(Panel(marks, axes))
         caption = (
             "Places of the ball in two upright planes through the arm's axis, as in [Vervloet2025] fig. 14: where the "
             f"gripper settles within {_SETTLED} with exact measurements, and how many cameras see ball and markers "
             "whole."
         )
-        return [Figure("workspace", caption)]
+        return drawn(folder / "workspace", caption, panels if rows else [], 2, size=(8.0, 3.7))
 
 
 def reach_by_place(table: CampaignTable) -> dict[tuple[float, float], float]:
     """Return the largest distance, m, up to which all tried places were reached, by azimuth and height."""
     tried: dict[tuple[float, float], dict[float, bool]] = {}
     for row in table.rows:
-        if row["status"] == "done":
+        if is_done(row):
             tried.setdefault((row["azimuth"], row["height"]), {})[row["radius"]] = bool(row["success"])
     found: dict[tuple[float, float], float] = {}
     for place, by_radius in tried.items():
@@ -121,7 +117,7 @@ def reach_by_place(table: CampaignTable) -> dict[tuple[float, float], float]:
     return found
 
 
-def _in_plane(row: Mapping[str, Any], turn: float) -> tuple[float, float] | None:
+def _in_plane(row: Row, turn: float) -> tuple[float, float] | None:
     """Return where a place is in an upright plane through the axis; None where it is not in it."""
     across = row["radius"] * np.sin(row["azimuth"] - turn)
     if abs(across) > 0.1 * row["radius"]:
@@ -129,11 +125,16 @@ def _in_plane(row: Mapping[str, Any], turn: float) -> tuple[float, float] | None
     return float(np.sign(np.cos(row["azimuth"] - turn)) * row["radius"]), row["height"]
 
 
-def _shade(axes: Any, turn: float) -> None:
-    """Shade the plane by how many cameras see ball and markers."""
-    s, z = np.linspace(-0.4, 0.4, 81), np.linspace(-0.85, -0.3, 56)
-    seen = np.array([[cameras_that_see(_point(x, y, turn)) for x in s] for y in z])
-    axes.pcolormesh(s, z, seen, cmap=ListedColormap(list(_SHADES)), vmin=-0.5, vmax=2.5, shading="nearest")
+@dataclass(frozen=True)
+class _Seen:
+    """The plane by how many cameras see ball and markers."""
+
+    turn: float
+
+    def draw(self, axes: Axes) -> None:
+        s, z = np.linspace(-0.4, 0.4, 81), np.linspace(-0.85, -0.3, 56)
+        seen = np.array([[cameras_that_see(_point(x, y, self.turn)) for x in s] for y in z])
+        axes.pcolormesh(s, z, seen, cmap=ListedColormap(list(_SHADES)), vmin=-0.5, vmax=2.5, shading="nearest")
 
 
 def _point(s: float, z: float, turn: float) -> Floats:
@@ -141,53 +142,43 @@ def _point(s: float, z: float, turn: float) -> Floats:
 
 
 def _limited_by_cameras(table: CampaignTable) -> Claim:
-    facts: dict[str, Any] = {
-        "claim": "The cameras' view, not the arm, limits where a ball can be taken",
-        "published": "limited by what was captured by the two cameras",
-        "where": "sec. 5.4.1, fig. 14",
-    }
-    rows = [row for row in table.rows if row["status"] == "done"]
+    says = Statement(
+        "The cameras' view, not the arm, limits where a ball can be taken",
+        "sec. 5.4.1, fig. 14",
+        "limited by what was captured by the two cameras",
+    )
+    rows = [row for row in table.rows if is_done(row)]
     if not rows:
-        return nothing_measured(**facts)
+        return says.unknown()
     seen = [cameras_that_see(_point(row["radius"], row["height"], row["azimuth"])) == 2 for row in rows]
     reached = [bool(row["success"]) for row in rows]
     only_seen = sum(a and not b for a, b in zip(seen, reached, strict=True))
     only_reached = sum(b and not a for a, b in zip(seen, reached, strict=True))
-    return Claim(
-        **facts,
-        measured=f"of {counted(len(rows), 'place')} {only_reached} are reached and not seen, "
-        f"{only_seen} seen and not reached",
-        verdict=_if_whole(table, only_reached > only_seen),
-        reason="Reproduced if more of the tried places are within reach and out of view than the other way round; a "
-        f"part of the {_WHOLE} places decides nothing. "
+    return says.judged(
+        f"of {counted(len(rows), 'place')} {only_reached} are reached and not seen, {only_seen} seen and not reached",
+        only_reached > only_seen,
+        f"more of the {_WHOLE} places are within reach and out of view than the other way round",
         "Where the thesis's cameras stood is known roughly, and of its arm's stiffness and load nothing.",
+        enough=_is_whole(rows),
     )
 
 
 def _kept(table: CampaignTable) -> Claim:
-    facts: dict[str, Any] = {
-        "claim": "The reach that warns before a handover is the one found",
-        "published": "",
-        "beyond": True,
-    }
+    says = Statement("The reach that warns before a handover is the one found")
     found = reach_by_place(table)
-    heights = sorted({z for _, z in found})
-    if not heights:
-        return nothing_measured(**facts)
-    least = {z: min(r for (_, height), r in found.items() if height == z) for z in heights}
-    off = max(abs(least[z] - reach(z)) for z in heights)
-    return Claim(
-        **facts,
-        measured=f"{off:.3f} m apart at most, at {len(heights)} heights",
-        verdict=_if_whole(table, off <= _TOLERANCE),
-        reason=f"Holds if both differ by {_TOLERANCE} m at most at each height, in the direction of the least reach; "
-        f"a part of the {_WHOLE} places decides nothing.",
+    least = {z: min(r for (_, height), r in found.items() if height == z) for z in {z for _, z in found}}
+    if not least:
+        return says.unknown()
+    off = max(abs(r - reach(z)) for z, r in least.items())
+    return says.judged(
+        f"{off:.3f} m apart at most, at {len(least)} heights",
+        off <= _TOLERANCE,
+        f"both differ by {_TOLERANCE} m at most at each height, in the direction of the least reach, by all {_WHOLE} "
+        "places",
+        enough=_is_whole([row for row in table.rows if is_done(row)]),
     )
 
 
-def _if_whole(table: CampaignTable, holds: bool) -> Verdict:
-    """Return the verdict, none where places of the whole plan have not been tried."""
-    tried = {(row["azimuth"], row["height"], row["radius"]) for row in table.rows if row["status"] == "done"}
-    if len(tried) < _WHOLE:
-        return Verdict.NOT_COMPARABLE
-    return Verdict.REPRODUCED if holds else Verdict.NOT_REPRODUCED
+def _is_whole(rows: Sequence[Row]) -> bool:
+    """Return whether all places of the whole plan have been tried."""
+    return len({(row["azimuth"], row["height"], row["radius"]) for row in rows}) >= _WHOLE

@@ -99,7 +99,8 @@ def test_whether_failures_grow_with_less_skill_and_the_rigid_robot_does_better_i
 
 
 def test_of_the_quick_plans_runs_and_of_none_nothing_is_concluded():
-    for table in (table_of(quick=True), made_table([{"status": "failed"}])):
+    nobody = {"status": "failed", "task": "collaborative", "behaviour": "rigid", "skill": 0.9}
+    for table in (table_of(quick=True), made_table([nobody])):
         assert {c.verdict for c in verdicts(table).values()} == {Verdict.NOT_COMPARABLE}
 
 

@@ -28,13 +28,6 @@ from handover.scenarios.campaign.statistics import MIN_SAMPLES
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.cli.campaign import CampaignProgress
 from handover.scenarios.published.helix.helix_1 import Helix1
-from handover.scenarios.published.helix.helix_1_spread import (
-    fitted_rows,
-    spread_claims,
-    spread_rows,
-    spread_table,
-    undisturbed,
-)
 from handover.scenarios.published.published_experiment import Claim, PaperResults, Verdict, draw_figures, write_claims
 
 PERIOD_TEXTS = {"0.1": "1.38", "0.2": "1.51", "0.4": "1.45"}
@@ -45,9 +38,8 @@ def test_the_fitted_arm_is_tried_as_the_shipped_one_and_its_runs_are_found_again
     fitted = [p for p in plan.points if "arm.natural_length" in p]
     assert Counter((p["alpha"], p["control_period"]) for p in fitted) == dict.fromkeys(PERIOD_TEXTS.items(), 4)
     unset = dict.fromkeys([name for p in plan.points for name in p], "")
-    table = made_table({"run": str(i), **unset, **p} for i, p in enumerate(plan.points))
-    assert len(fitted_rows(table).rows) == len(fitted)
-    assert len(undisturbed(table).rows) == 24
+    table = made_table({"run": str(i), "status": "failed", **unset, **p} for i, p in enumerate(plan.points))
+    assert [arm.broken for arm in Helix1().arms(table)] == [12, len(fitted), 12]
 
 
 def test_each_step_size_has_its_published_period_at_each_place_twice():
@@ -202,6 +194,7 @@ def test_times_are_drawn_and_errors_of_runs_that_left_a_record(tmp_path: Path, s
     assert list(sketches) == ["times", "errors", "single_errors"]
 
 
+SPREAD = "One of the disturbances"
 PLAIN = {0.1: spread(41.0, 1.0), 0.2: spread(29.0, 1.0), 0.4: spread(16.0, 0.5)}
 DEFAULTS: dict[str, Any] = {"lost_pictures": 0.0, "tremor": 0.001, "drift": 0.003, "jitter": 0.0, "detector": "joint"}
 
@@ -223,8 +216,9 @@ def table_with(amiss: Mapping[str, Any], times: Sequence[float | None]) -> Campa
 )
 def test_runs_with_something_amiss_have_their_row_and_stay_out_of_table_1(amiss: Mapping[str, Any], label: str):
     table = table_with(amiss, spread(100.0, 50.0))
-    assert [(case.label, len(rows)) for case, rows in spread_rows(table).items()] == [("nothing", 8), (label, 8)]
-    assert len(undisturbed(table).rows) == 24
+    found = Helix1().spread(table)
+    assert [(case.label, len(runs)) for case, runs in found.items()] == [("nothing", 8), (label, 8)]
+    assert Helix1().arms(table)[0].tried == 24
     assert Helix1().tables(table)[0].rows == Helix1().tables(table_of(PLAIN))[0].rows
 
 
@@ -240,7 +234,7 @@ def test_runs_with_something_amiss_have_their_row_and_stay_out_of_table_1(amiss:
 def test_times_are_like_the_published_ones_by_mean_and_spread_and_if_all_close(
     times: Sequence[float | None], holds: bool
 ):
-    (claim,) = spread_claims(table_with({"drift": 0.03}, times))
+    claim = judged(table_with({"drift": 0.03}, times), SPREAD)
     assert claim.beyond
     assert claim.verdict is (Verdict.REPRODUCED if holds else Verdict.NOT_REPRODUCED)
     assert claim.measured == ("hand's drift 30 mm" if holds else "none of 1")
@@ -248,13 +242,12 @@ def test_times_are_like_the_published_ones_by_mean_and_spread_and_if_all_close(
 
 def test_the_published_times_stand_above_ours_and_two_are_too_few_to_compare(wording: Wording):
     two = table_with({"tremor": 0.01}, [50.0, 60.0])
-    assert spread_claims(two)[0].verdict is Verdict.NOT_COMPARABLE
+    assert judged(two, SPREAD).verdict is Verdict.NOT_COMPARABLE
     for table in (table_with({"jitter": 0.3}, [50.0, 60.0, None, 70.0]), two):
-        wording.check(text_of(spread_table(table)))
+        wording.check(text_of(Helix1().tables(table)[4:]))
     plain = table_of(PLAIN)
-    assert not spread_rows(plain)
-    assert not spread_claims(plain)
-    assert not spread_table(plain)
+    assert not Helix1().spread(plain)
+    assert len(Helix1().tables(plain)) == 4
 
 
 @pytest.mark.slow
@@ -287,7 +280,7 @@ def test_an_arm_that_has_no_time_to_move_is_reported_as_such(tmp_path: Path):
     assert len(results.tables) == 4
     claims = [Claim.from_data(c) for c in json.loads((place.path / "claims.json").read_text("utf-8"))]
     closes = one(claims, "begins to close")
-    assert (closes.measured, closes.verdict) == ("0 of 1", Verdict.NOT_REPRODUCED)
+    assert (closes.measured, closes.verdict) == ("0/1 (0 %)", Verdict.NOT_COMPARABLE)
     assert not list(place.figures.iterdir())
 
 
@@ -299,7 +292,7 @@ def test_the_record_of_a_handover_is_judged_and_drawn(tmp_path: Path, sketches: 
     Helix1().draw(table, tmp_path, tmp_path)
     assert set(sketches) == {"times", "errors", "single_errors", "model", "estimate"}
     claims = PaperResults.of(Helix1(), table, tmp_path).claims
-    assert one(claims, "Every handover succeeds").measured == "1 of 1"
+    assert one(claims, "Every handover succeeds").measured == "1/1 (100 %)"
     assert "/1 " in one(claims, "The error rises at the change from the first goal to the second").measured
 
 
