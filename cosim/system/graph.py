@@ -83,6 +83,10 @@ _BOX_WIDTH, _LINE_HEIGHT, _LETTER = 170, 15, 6.6
 """Least width of a unit's box, height of a line of text in it, width of a letter, pixels."""
 _NAME, _DETAIL = ' font-weight="bold"', ""
 """Attributes of the first line of text in a box, and of the others."""
+_BOX = np.array([_BOX_WIDTH + 12.0, 3.0 * _LINE_HEIGHT + 22.0])
+"""Room of a box, pixels; that of another does not begin within it."""
+_ROUNDS = 200
+"""In which boxes are moved apart, at most."""
 _FEW = 12
 """Number of units up to which a box has room for more than the name."""
 
@@ -101,6 +105,11 @@ def system_svg(system: "System") -> str:
         name: np.array([width / 2, height / 2]) + p * np.array([1.0, -1.0]) * inner
         for name, p in places(names, bundles).items()
     }
+    _move_apart(at)
+    points = np.array(list(at.values()))
+    beyond = np.maximum(_BOX / 2.0 - points.min(axis=0), 0.0)
+    at = {name: p + beyond for name, p in at.items()}
+    width, height = (float(x) for x in np.maximum((width, height), points.max(axis=0) + beyond + _BOX / 2.0).round())
     colour = {name: _COLOURS[k % len(_COLOURS)] for k, name in enumerate(names)}
     lines = [
         _arrow(bent(at[a], at[b]), colour[a], _connections_text(system, a, b, cs)) for (a, b), cs in bundles.items()
@@ -109,10 +118,23 @@ def system_svg(system: "System") -> str:
         _box(unit, at[unit.name], colour[unit.name], detailed=len(names) <= _FEW) for unit in system.units.values()
     ]
     return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" role="img" '
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:g} {height:g}" width="{width:g}" role="img" '
         f'aria-label="graph of {len(names)} units" style="max-width: 100%; background: #fff; font: 12px sans-serif">'
         f"{''.join(lines)}{''.join(boxes)}</svg>"
     )
+
+
+def _move_apart(at: dict[str, Floats]) -> None:
+    """Move the middles of boxes until no box covers another: of two, each half the shorter way apart."""
+    for _ in range(_ROUNDS):
+        overlapping = [(a, b) for a, b in itertools.combinations(at, 2) if np.all(np.abs(at[b] - at[a]) < _BOX)]
+        if not overlapping:
+            return
+        for a, b in overlapping:
+            over = _BOX - np.abs(at[b] - at[a])
+            along = over == over.min()
+            push = np.where(along, 0.51 * over, 0.0) * np.where(at[b] >= at[a], 1.0, -1.0)
+            at[a], at[b] = at[a] - push, at[b] + push
 
 
 def _connections_text(system: "System", source: str, target: str, connections: "Sequence[Connection]") -> str:

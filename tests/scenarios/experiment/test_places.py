@@ -1,6 +1,7 @@
 """What scenarios declare of their places is what they wire, with nothing left out, and runs as a compiled plan."""
 
 import re
+from itertools import combinations
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -10,6 +11,7 @@ from support.rewritten_archive import described_otherwise
 from handover.cosim.blocks.variable import Causality
 from handover.cosim.master.stepper_factory import StepperFactory
 from handover.cosim.stepping.options import MasterOptions
+from handover.cosim.system.graph import system_svg
 from handover.cosim.system.system import System
 from handover.fmus.build import cached
 from handover.fmus.catalog import find_unit
@@ -77,6 +79,16 @@ def test_a_note_names_a_few_ports_that_a_unit_lacks_and_counts_many():
     assert f"no outputs {', '.join(absent[Causality.OUTPUT])}: " in note
     many = len(absent[Causality.PARAMETER])
     assert f"no parameters of ArmImpedanceController's {many}, which `handover list ArmImpedanceController` " in note
+
+
+def test_no_box_covers_another_in_the_graph_of_a_scenario(systems: Systems):
+    numbers = re.findall(
+        r'<rect x="([-\d.]+)" y="([-\d.]+)" width="([\d.]+)" height="([\d.]+)"', system_svg(systems.fitted)
+    )
+    boxes = [tuple(map(float, found)) for found in numbers]
+    assert len(boxes) == len(systems.fitted.units)
+    for (x, y, w, h), (x_2, y_2, w_2, h_2) in combinations(boxes, 2):
+        assert x + w < x_2 or x_2 + w_2 < x or y + h < y_2 or y_2 + h_2 < y
 
 
 def test_every_scenario_runs_as_a_compiled_plan(systems: Systems):
