@@ -200,7 +200,7 @@ def _strengths(
         panels.append(Panel(marks, {**axes, "ylabel": "gripper along z (mm)", **limits}))
     caption = (
         "How far the gripper goes from its place along z of W as the robot gives, by the force with which the person "
-        "pulls at most: each run, and lines through the medians of those that the robot felt in all runs; hollow where "
-        "it did not, and the person gave up. Dashed: sec. 4.3.1."
+        "pulls at most. Shown are each run, and lines through the medians of those that the robot felt in all runs; "
+        "hollow where it did not, and the person gave up. Dashed: sec. 4.3.1."
     )
     return drawn(folder / "strength", caption, panels, len(thrusts), size=(9.0, 3.7), same_height=True)

@@ -94,10 +94,10 @@ class FlyerImpedanceTable(PublishedExperiment):
             table_of(
                 f"Pushes of {_USUAL:g} s",
                 [_push(runs, *case) for case in _CASES],
-                "Greatest errors of the gripper's position and orientation with ideal thrust; the push's own one by "
-                "the linear response of the controller's model; the largest difference to eq. (4.4) along any axis "
-                "(published: at most 7 mm and 1.1°); greatest errors with Astrobee's limits of thrust, and whether the "
-                "robot then comes back to rest within a minute.",
+                "Greatest errors of the gripper's position and orientation with ideal thrust, and the push's own one "
+                "by the linear response of the controller's model. Off eq. (4.4): the largest difference along any "
+                "axis (published: at most 7 mm and 1.1°). Then greatest errors with Astrobee's limits of thrust, and "
+                "whether the robot comes back to rest within a minute.",
             ),
             *([table_of(
                 "How much farther the compliant robot yields",

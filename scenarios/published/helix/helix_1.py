@@ -631,8 +631,8 @@ def spread_claims(found: Mapping[Case, Runs]) -> list[Claim]:
     claim = says.judged(
         ", ".join(alike) or f"none of {len(enough)}",
         bool(alike),
-        "there is a case in which the gripper begins to close in every run, and neither Welch's test of the means nor "
-        "the F test of the standard deviations separates its times from the published ones, each at its own 5 %",
+        "in a case the gripper closes in every run, and neither Welch's test of the means nor the F test of the "
+        "standard deviations separates its times from the published ones",
     )
     return [claim]
 

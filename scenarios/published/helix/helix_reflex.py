@@ -108,9 +108,9 @@ class HelixReflex(PublishedExperiment):
                     for c in CAMERAS
                     for r in (True, False)
                 ],
-                "Medians, with intervals by bootstrap, of the runs in which the gripper closed: the ball's offset "
-                "beside and along the gripper's axis as it began to close, by ground truth, and the controller's error "
-                f"of that; then the offset beside the axis as the ball left the hand. {tests}",
+                "Medians, with intervals by bootstrap, of the runs in which the gripper closed. They are the ball's "
+                "offset beside and along the gripper's axis as it began to close, by ground truth, and the "
+                f"controller's error of that; then the offset beside the axis as the ball left the hand. {tests}",
             ),
             table_of(
                 "A model that is wrong",
