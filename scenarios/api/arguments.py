@@ -319,7 +319,8 @@ def master_options(
     """Return the master's options: the given ones or the command's defaults, with algorithm and isolation set.
 
     Raises:
-        InvalidInput: there is no such algorithm, or one is of another type. InvalidOptions: see `MasterOptions`.
+        InvalidInput: there is no such algorithm, one is of another type, or options say otherwise than an argument.
+        InvalidOptions: see `MasterOptions`.
     """
     default = MasterOptions(call_limit=CALL_LIMIT) if options is None else options
     chosen: MasterOptions = of_type("options", default, MasterOptions, "handover.MasterOptions(...)")
@@ -328,6 +329,10 @@ def master_options(
         if algorithm not in known:
             raise InvalidInput(f"no algorithm {algorithm!r}; {nearest(algorithm, known)}")
         algorithm = known[algorithm]
-    names = several_texts("isolate", isolate)
-    chosen = chosen if algorithm is None else replace(chosen, algorithm=algorithm)
-    return replace(chosen, isolated=tuple(dict.fromkeys(names))) if names else chosen
+    names = tuple(dict.fromkeys(several_texts("isolate", isolate)))
+    given = {**({} if algorithm is None else {"algorithm": algorithm}), **({"isolated": names} if names else {})}
+    for name, value in given.items():
+        if getattr(chosen, name) not in (getattr(MasterOptions(), name), value):
+            argument = "isolate" if name == "isolated" else name
+            raise InvalidInput(f"{argument}, options: both give {name!r}, in different ways; give one of them")
+    return replace(chosen, **given)

@@ -199,6 +199,12 @@ CALLS: dict[str, Callable[[Any], object]] = {
     "values without end": lambda h: h.sweep("ir_grasp", forward=range(10**30)),
     "out that no file system takes": lambda h: h.run("ir_grasp", out="a\0b"),
     "flag of a text": lambda h: h.MasterOptions(strict="no"),
+    "another algorithm in the options": lambda h: h.run(
+        "ir_grasp", algorithm="jacobi", options=h.MasterOptions(algorithm=h.Algorithm.NEWTON)
+    ),
+    "other isolated units in the options": lambda h: h.run(
+        "ir_grasp", isolate="scene", options=h.MasterOptions(isolated=("reflex",))
+    ),
 }
 
 
