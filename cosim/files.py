@@ -173,7 +173,7 @@ def read_regular(path: Path, most: float = MOST) -> bytes:
     """Return the content of a regular file.
 
     Raises:
-        OSError: it cannot be read, is no regular file, or longer than `most` bytes.
+        OSError: it cannot be read, is not a regular file, or longer than `most` bytes.
     """
     with open_regular(path, most) as file:
         return file.read()

@@ -84,7 +84,7 @@ def read_typed(file: Path, declared: type[T], most: float = MOST) -> T:
     """Return what a JSON file holds.
 
     Raises:
-        OSError: it cannot be read, is no regular file, or longer than `most` bytes.
+        OSError: it cannot be read, is not a regular file, or longer than `most` bytes.
         InvalidData: as by `decoded`.
     """
     return decoded(read_regular(file, most), declared)

@@ -64,7 +64,7 @@ class UnknownVersion(ValueError):
 
 
 class InvalidName(ValueError):
-    """An FMU's name is no identifier in C, which FMI requires as it is also the name of its library."""
+    """An FMU's name is not an identifier in C, which FMI requires as it is also the name of its library."""
 
     def __init__(self, name: str) -> None:
         super().__init__(f"an FMU cannot be named {name!r}: a name consists of ASCII letters, digits and underscores")

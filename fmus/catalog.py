@@ -29,7 +29,7 @@ class UnknownUnit(LookupError):
 
 
 class UnknownBlock(LookupError):
-    """There is no such class, or it is no block; the message says what of its path is missing."""
+    """There is no such class, or it is not a block; the message says what of its path is missing."""
 
     def __init__(self, path: str, fault: str) -> None:
         super().__init__(f"{path}: {fault}")
@@ -243,7 +243,7 @@ def find_unit(name: str) -> Entry:
 
     Raises:
         UnknownUnit: there is no unit of this name.
-        UnknownBlock: there is no such class, its module cannot be loaded, or it is no block.
+        UnknownBlock: there is no such class, its module cannot be loaded, or it is not a block.
     """
     if name in UNITS:
         return UNITS[name]
@@ -260,7 +260,7 @@ def own_unit(path: str, step: Fraction | None = None, name: str = "") -> Entry:
     Its step, in seconds, is that which is given, else the block's period, else 0.01.
 
     Raises:
-        UnknownBlock: there is no such class, its module cannot be loaded, or it is no block.
+        UnknownBlock: there is no such class, its module cannot be loaded, or it is not a block.
     """
     try:
         description = describe(import_class(path))
@@ -281,7 +281,7 @@ def import_class(path: str) -> type[Any]:
     if not colon:
         raise UnknownBlock(path, "there is no ':' between module and class, as in my_arm:MyArm")
     if not all(part.isidentifier() for part in (*module_name.split("."), name)):
-        raise UnknownBlock(path, "the names of a module and of a class in it are right, as in my_arm:MyArm")
+        raise UnknownBlock(path, "expected the names of a module and of a class in it, as in my_arm:MyArm")
     try:
         module = import_module(module_name)
     except (Exception, SystemExit) as e:  # a module may raise anything while it is loaded

@@ -134,7 +134,7 @@ def _exact_writer(
     """Return a function that writes outputs that have exactly the declared types.
 
     It raises TypeError for all others, although some of them can be converted, such as an array of integers, and
-    struct.error for a scalar that is no number. As generated code the checks take half the time of a loop over
+    struct.error for a scalar that is not a number. As generated code the checks take half the time of a loop over
     variables.
     """
     names: dict[str, Any] = {"array": np.ndarray, "real": np.dtype(np.float64)}
@@ -181,7 +181,7 @@ def _scalar_reading(buffers: Buffers, reals: Sequence[Slot], scalars: Sequence[s
 
 
 def _scalar_writing(buffers: Buffers, reals: Sequence[Slot], scalars: Sequence[Variable], names: dict[str, Any]) -> str:
-    """Return the statement that writes all real scalars; it raises struct.error for one that is no number."""
+    """Return the statement that writes all real scalars; it raises struct.error for one that is not a number."""
     if not scalars:
         return "pass"
     names.update(memory=buffers.floats.data.cast("B"), put=struct.Struct(f"={len(scalars)}d").pack_into)
@@ -262,7 +262,7 @@ Derivative = float | NDArray[np.float64]
 
 
 class InvalidDerivative(InvalidReturn):
-    """A block returned a derivative of something that is no real output, or not of that output's shape."""
+    """A block returned a derivative of something that is not a real output, or not of that output's shape."""
 
     def __init__(self, name: str, fault: str) -> None:
         super().__init__(f"gave {name!r}: {fault}")

@@ -141,7 +141,7 @@ class FileElsewhere(ValueError):
     """A data file does not lie in the folder of a block's module, or below."""
 
     def __init__(self, file: Path, folder: Path) -> None:
-        super().__init__(f"{file} does not lie in {folder}, the folder of the block's module, or is no file there")
+        super().__init__(f"{file} does not lie in {folder}, the folder of the block's module, or is not a file there")
         self.file, self.folder = file, folder
 
 

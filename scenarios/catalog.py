@@ -28,7 +28,7 @@ GROUP = "handover.scenarios"
 
 
 class InvalidScenario(ValueError):
-    """What is named is no scenario, or lacks what a scenario must have; `faults` lists all of it."""
+    """What is named is not a scenario, or lacks what a scenario must have; `faults` lists all of it."""
 
     def __init__(self, path: str, faults: Sequence[str]) -> None:
         super().__init__(f"{path}: {'; '.join(faults)}")
@@ -228,13 +228,13 @@ _OF_CLASSES: Mapping[str, Expected] = {
 def _faults_of(named: type[Any]) -> list[str]:
     """Return what keeps a class from being a scenario that runs."""
     if not issubclass(named, Experiment):
-        return [f"{named.__name__} is no scenario: it must be a subclass of Experiment"]
+        return [f"{named.__name__} is not a scenario: it must be a subclass of Experiment"]
     scenario: type[Experiment[Any]] = named
     faults = [f"it has no method {name!r}" for name in sorted(getattr(scenario, "__abstractmethods__", ()))]
     try:
         if not is_dataclass(scenario.parameters_type):
             right = "write @dataclass(frozen=True, kw_only=True) in the line above its class"
-            raise TypeError(f"{scenario.parameters_type} is no dataclass; {right}")
+            raise TypeError(f"{scenario.parameters_type} is not a dataclass; {right}")
         scenario.parameters()
     except (DeclarationError, TypeError) as e:
         faults.append(f"its parameters are invalid: {one_line(e)}")

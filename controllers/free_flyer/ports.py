@@ -87,7 +87,7 @@ TERMINALS = (
 
 
 class InvalidOrientation(ValueError):
-    """A quaternion that is zero or not finite, which is no orientation; nothing has changed."""
+    """A quaternion that is zero or not finite, which is not an orientation; nothing has changed."""
 
     is_refusal = True
 

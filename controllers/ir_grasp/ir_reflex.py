@@ -39,7 +39,7 @@ _BRAKING = 0.008  # m; before the slow part of the way to the pre-grasp pose (as
 
 
 class InvalidReading(InvalidParameters):
-    """An input that is no number; `faults` names all of them."""
+    """An input that is not a number; `faults` names all of them."""
 
     block = "IrReflex"
 
@@ -387,7 +387,7 @@ class IrReflex:
 
 
 def _check_inputs(u: Inputs) -> None:
-    """Raise InvalidReading for what is no number: no move would ever arrive, and no finger would ever see."""
+    """Raise InvalidReading for what is not a number: no move would ever arrive, and no finger would ever see."""
     inputs = {
         "ticks": u.ticks.tolist(),
         "p_WH": u.p_WH.tolist(),

@@ -104,7 +104,7 @@ class Domain:
     def outside(self, x: Floats, *, turned: bool = False) -> bool:
         """Return whether inputs x, shape (inputs,), lie outside the polytope, that is, surely beyond the training.
 
-        What is no number lies outside. If `turned`, the first input is an angle about an axis of symmetry, which
+        What is not a number lies outside. If `turned`, the first input is an angle about an axis of symmetry, which
         decides nothing: the polytope is that of the other inputs.
         """
         rows = self._directions[:, 0] == 0.0 if turned else slice(None)

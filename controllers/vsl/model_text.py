@@ -54,7 +54,7 @@ _MAX_DEPTH = 3
 
 
 class InvalidModel(ValueError):
-    """Text that is no model of this version.
+    """Text that is not a model of this version.
 
     `source` says where it came from, `fault` what is wrong, and `remedy` what makes one that is.
     """
@@ -301,7 +301,7 @@ class _Reader:
         except (binascii.Error, ValueError) as e:
             raise InvalidModel(self._source, f"{name}.weights is not base64: {e}") from e
         if len(data) % _STORED.itemsize:
-            raise InvalidModel(self._source, f"{name}.weights is no whole number of {_STORED.itemsize} bytes")
+            raise InvalidModel(self._source, f"{name}.weights is not a whole number of {_STORED.itemsize} bytes")
         numbers = np.frombuffer(data, _STORED)
         if not np.all(np.isfinite(numbers)):
             raise InvalidModel(self._source, f"{name}.weights must be made of finite numbers")

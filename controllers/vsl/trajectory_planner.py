@@ -136,7 +136,7 @@ class TrajectoryPlanner:
 
     Raises:
         InvalidPath: by the constructor, for values out of range, points out of reach or singular, no length, a file
-            that is no list of waypoints.
+            that is not a list of waypoints.
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = dict.fromkeys(
@@ -244,7 +244,7 @@ def segments_by(path: Path, x_0: Floats, x_g: Floats, waypoints: str) -> Sequenc
     """Return the segments of a path: of a CUSTOM one by the file of waypoints, if one is named, else as `segments_of`.
 
     Raises:
-        InvalidWaypoints: there is no such file, or it is no list of waypoints.
+        InvalidWaypoints: there is no such file, or it is not a list of waypoints.
     """
     return read_waypoints(FilePath(waypoints)) if path is Path.CUSTOM and waypoints else segments_of(path, x_0, x_g)
 

@@ -24,7 +24,7 @@ _STRAIGHT = 1e-6
 
 
 class InvalidWaypoints(ValueError):
-    """A file that is no list of waypoints; `faults` lists what is wrong, with its lines."""
+    """A file that is not a list of waypoints; `faults` lists what is wrong, with its lines."""
 
     def __init__(self, file: Path, faults: Sequence[str]) -> None:
         super().__init__(f"{file}: " + "; ".join(faults))
@@ -66,7 +66,7 @@ def _rows(file: Path) -> list[tuple[int, dict[str, str]]]:
     except OSError as e:
         raise InvalidWaypoints(file, [reading_fault(e)]) from e
     except ValueError as e:
-        raise InvalidWaypoints(file, [f"it is no CSV file: {e}"]) from e
+        raise InvalidWaypoints(file, [f"it is not CSV file: {e}"]) from e
     columns = [name.strip() for name in header]
     rows = [(line, [cell.strip() for cell in row]) for line, row in lines if any(row)]
     if not set(_TO) <= set(columns) <= {*_TO, *_VIA} or len(set(columns)) < len(columns):

@@ -42,7 +42,7 @@ def declared_variables(owner: type[Any], causality: Causality, block: str = "") 
     known = {v.name for v in variables}
     for v in variables:
         if unknown := [name for need in v.needs for name in need.names if name not in known]:
-            raise DeclarationError(owner_name, v.name, f"it needs {', '.join(unknown)}, which is no field beside it")
+            raise DeclarationError(owner_name, v.name, f"it needs {', '.join(unknown)}, which is not a field beside it")
     return variables
 
 

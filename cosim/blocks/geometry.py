@@ -56,7 +56,7 @@ def rotation_of(q_AB: Floats) -> Floats:
     """
     q = quaternion(np.asarray(q_AB, dtype=np.float64))
     if quaternion_dot(q, q) == 0.0:
-        raise ValueError("a quaternion of length 0 is no rotation")
+        raise ValueError("a quaternion of length 0 is not a rotation")
     return _matrix(normalize(q))
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 
 class InvalidSchedule(ValueError):
-    """A text that is no schedule; `fault` says why."""
+    """A text that is not a schedule; `fault` says why."""
 
     def __init__(self, fault: str) -> None:
         super().__init__(fault)

@@ -42,7 +42,7 @@ _BUFFER = 1024
 
 
 class NotPlainData(TypeError):
-    """A state holds something that is no plain data."""
+    """A state holds something that is not plain data."""
 
     def __init__(self, value: object) -> None:
         kind = type(value)
@@ -179,7 +179,7 @@ def _parsed(header: bytes) -> tuple["np.dtype[Any]", Any, tuple[int, ...]]:
     dtype, shape = np.dtype(kind), tuple(map(int, sizes))
     is_plain = dtype.kind in _KINDS and dtype.itemsize > 0
     if not is_plain or order not in ("C", "F") or min(shape, default=0) < 0:
-        raise InvalidState(f"the state holds an array of {header[:-1].decode('ascii')!r}, which is no plain data")
+        raise InvalidState(f"the state holds an array of {header[:-1].decode('ascii')!r}, which is not plain data")
     return dtype, order, shape
 
 

@@ -201,7 +201,7 @@ def _enumeration_findings(v: DescribedVariable, declared: XmlElement | None) -> 
     wrong = [s for s in v.starts or () if s not in items]
     if wrong:
         cure = f"valid: {', '.join(items[:20])}"
-        yield fault(f"start value {wrong[0]} is no item of its type {name!r}", where=v.where, cure=cure)
+        yield fault(f"start value {wrong[0]} is not an item of its type {name!r}", where=v.where, cure=cure)
 
 
 def _unit_findings(
@@ -255,6 +255,6 @@ def _dimension_findings(variables: Sequence[DescribedVariable]) -> Iterator[Find
             elif sizing is not None and (sizing.type != "UInt64" or sizing.causality != "structuralParameter"):
                 if not (sizing.type == "UInt64" and sizing.element.get("variability") == "constant"):
                     what = f"its dimension is {sizing.name!r}, a {sizing.causality} of type {sizing.type}"
-                    yield fault(what, where=v.where, cure="a structural parameter of type UInt64 is right")
+                    yield fault(what, where=v.where, cure="expected a structural parameter of type UInt64")
             elif not reference and d.get("start") == "0":
                 yield fault("has a dimension of 0", where=v.where)

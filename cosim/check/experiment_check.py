@@ -152,7 +152,9 @@ def _judged(compared: Sequence[Difference], setup: Setup) -> Iterator[Finding]:
     for d in (d for d in compared if d.greatest):
         where = f"output {d.name!r}"
         if math.isinf(d.greatest):
-            yield fault(f"it is not as in the result from t = {d.at:.6g} s on", where=where, cure="equal is right")
+            yield fault(
+                f"it is not as in the result from t = {d.at:.6g} s on", where=where, cure="expected equal values"
+            )
             continue
         allowed = setup.allowed(d)
         size = f"it differs from the result by up to {d.greatest:.3g} at t = {d.at:.6g} s"
@@ -166,7 +168,7 @@ def parameter_faults(d: FmuDescription, recorded: Mapping[str, str]) -> list[str
     faults: list[str] = []
     for name, text in recorded.items():
         if name not in d.parameters:
-            faults.append(f"{name!r} is no parameter of the FMU: {nearest(name, d.parameters)}")
+            faults.append(f"{name!r} is not a parameter of the FMU: {nearest(name, d.parameters)}")
         elif not _same_start(d.parameters[name], text):
             given = d.parameters[name].start or ""
             faults.append(f"{name} was {short_repr(text)} and is {short_repr(given)}")

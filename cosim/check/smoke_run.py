@@ -242,7 +242,7 @@ def _value_findings(port: FmuPort, values: Any, t: float) -> Iterator[Finding]:
     elif port.kind is Kind.ENUMERATION and (
         wrong := [x for x in values.tolist() if x not in [value for _, value in port.items]]
     ):
-        yield warning(f"{wrong[0]} is no item of its type", where=where)
+        yield warning(f"{wrong[0]} is not an item of its type", where=where)
 
 
 def main(task: Mapping[str, Any]) -> None:

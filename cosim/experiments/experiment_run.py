@@ -110,7 +110,7 @@ class _Run:
 
         Raises:
             UnitFailure: a call failed.
-            _NotFinite: an output is no number.
+            _NotFinite: an output is not a number.
         """
         unit = self._unit
         unit.start(float(points[0]), self._start_values())
@@ -153,7 +153,7 @@ class _Run:
 
 
 class _NotFinite(Exception):
-    """An output is no number: where, and what it is."""
+    """An output is not a number: where, and what it is."""
 
     def __init__(self, where: str, value: float) -> None:
         super().__init__(where, value)

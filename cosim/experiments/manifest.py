@@ -81,7 +81,7 @@ def related_files(archive: FmuArchive) -> tuple[list[RelatedFile], list[Finding]
     except UnsafeXml as e:
         return [], [fault(str(e), where=MANIFEST)]
     if root.tag != ROOT:
-        return [], [fault(f"its outermost element is <{root.tag}>", where=MANIFEST, cure=f"<{ROOT}> is right")]
+        return [], [fault(f"its outermost element is <{root.tag}>", where=MANIFEST, cure=f"expected <{ROOT}>")]
     findings = list(_root_findings(root))
     files: list[RelatedFile] = []
     for element in root.children:
@@ -90,7 +90,7 @@ def related_files(archive: FmuArchive) -> tuple[list[RelatedFile], list[Finding]
             findings += _findings(archive, element, files[-1])
         elif element.tag != "Annotations":
             where = f"{MANIFEST}, line {element.line}"
-            cure = "<Related> or <Annotations> is right"
+            cure = "expected <Related> or <Annotations>"
             findings.append(fault(f"<{element.tag}> is not known", where=where, cure=cure))
     return files, findings
 
@@ -101,10 +101,10 @@ def _root_findings(root: XmlElement) -> Iterator[Finding]:
         given = root.attributes.get(f"{{{NAMESPACE}}}fmi-ls-{name}")
         if given is None:
             what = f"it has no attribute fmi-ls-{name} of the namespace {NAMESPACE}"
-            yield fault(what, where=where, cure=f"{wanted!r} is right" if wanted else f"such as {VERSION}")
+            yield fault(what, where=where, cure=f"expected {wanted!r}" if wanted else f"such as {VERSION}")
         elif wanted and given != wanted:
             level = fault if name == "name" else warning
-            yield level(f"fmi-ls-{name}={given[:80]!r}", where=where, cure=f"{wanted!r} is right")
+            yield level(f"fmi-ls-{name}={given[:80]!r}", where=where, cure=f"expected {wanted!r}")
 
 
 def _related(archive: FmuArchive, element: XmlElement) -> RelatedFile:
@@ -126,11 +126,11 @@ def _related(archive: FmuArchive, element: XmlElement) -> RelatedFile:
 def _findings(archive: FmuArchive, element: XmlElement, file: RelatedFile) -> Iterator[Finding]:
     yield from _role_findings(element, file)
     if not file.source:
-        yield fault("a file without a source", where=file.where, cure="a URI relative to the manifest is right")
+        yield fault("a file without a source", where=file.where, cure="expected a URI relative to the manifest")
     elif _is_absolute(file.source):
         yield note(f"{file.source[:200]!r} lies outside of the FMU and was not looked at", where=file.where)
     elif (path := path_in_archive(file.source)) is None:
-        cure = "a path relative to the manifest, at most two folders up, is right"
+        cure = "expected a path relative to the manifest, at most two folders up"
         yield fault(f"{file.source[:200]!r} leads out of the archive", where=file.where, cure=cure)
     elif not file.path:
         there = [name for name in archive.names if name.startswith(f"{FOLDER}/") and name != MANIFEST]
@@ -141,10 +141,10 @@ def _findings(archive: FmuArchive, element: XmlElement, file: RelatedFile) -> It
 def _role_findings(element: XmlElement, file: RelatedFile) -> Iterator[Finding]:
     given = element.get("role")
     if file.role not in ROLES:
-        yield fault(f"role {given[:80]!r} is not known", where=file.where, cure=f"one of {', '.join(ROLES)} is right")
+        yield fault(f"role {given[:80]!r} is not known", where=file.where, cure=f"expected one of {', '.join(ROLES)}")
     elif "/" in given and file.role != _FREE_SUB_ROLE and file.sub_role not in _SUB_ROLES.get(file.role, ()):
         valid = ", ".join(f"{file.role}/{sub}" for sub in _SUB_ROLES.get(file.role, ()))
-        cure = f"{file.role}{f', {valid}' if valid else ''} is right"
+        cure = f"expected {file.role}{f', {valid}' if valid else ''}"
         yield fault(f"role {given[:80]!r} has a sub-role that is not known", where=file.where, cure=cure)
 
 

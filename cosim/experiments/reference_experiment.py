@@ -128,7 +128,7 @@ def _setup(element: XmlElement) -> Setup:
     tag = f"{{{ANNOTATION_NAMESPACE}}}"
     step = _exact_step(element.get("step"))
     if step is None:
-        raise ValueError(f"step={element.get('step')[:40]!r} is no positive number of seconds")
+        raise ValueError(f"step={element.get('step')[:40]!r} is not a positive number of seconds")
     return Setup(
         step=step,
         relative=_tolerance(element, "relative"),
@@ -139,7 +139,7 @@ def _setup(element: XmlElement) -> Setup:
 
 
 def _exact_step(text: str) -> Fraction | None:
-    """Return a step of 1/30 or 0.02, for example, exactly; None if it is no positive number that a double can hold.
+    """Return a step of 1/30 or 0.02, for example, exactly; None if it is not a positive number that a double can hold.
 
     That is seen before an exact number is made, as one of `1e20000000` would take minutes.
     """
@@ -158,7 +158,7 @@ def _tolerance(element: XmlElement, name: str) -> float:
     except ValueError:
         number = math.nan
     if not 0 <= number < math.inf:
-        raise ValueError(f"{name}={element.get(name)[:40]!r} is no tolerance; a number from 0 on is right")
+        raise ValueError(f"{name}={element.get(name)[:40]!r} is not a tolerance; expected a number from 0 on")
     return number
 
 
@@ -168,9 +168,9 @@ class Difference:
 
     Attributes:
         name: of the variable.
-        greatest: the greatest difference of an entry; infinity of what is no real number and differs.
+        greatest: the greatest difference of an entry; infinity of what is not a real number and differs.
         at: when, in seconds.
-        largest: the largest magnitude that the variable has in the reference; 0 of what is no real number.
+        largest: the largest magnitude that the variable has in the reference; 0 of what is not a real number.
         resolution: relative to the magnitude, a unit in the last place of a Float32; 0 of all others.
     """
 

@@ -116,7 +116,7 @@ def read_header(content: bytes, name: str) -> list[str]:
     """Return the names of a table's columns, without the time.
 
     Raises:
-        InvalidTable: it is no CSV in UTF-8, its first column is not the time, or a column is there twice.
+        InvalidTable: it is not CSV in UTF-8, its first column is not the time, or a column is there twice.
     """
     header, _ = _rows(content, name)
     return header
@@ -142,7 +142,7 @@ def read_table(content: bytes, name: str, columns: Mapping[str, Column], *, in_r
     values: list[list[Any]] = [[] for _ in header]
     for line, row in rows:
         if len(row) != len(header) + 1:
-            faults.append(f"line {line} has {len(row)} values; {len(header) + 1} are right, as in the first line")
+            faults.append(f"line {line} has {len(row)} values; expected {len(header) + 1}, as in the first line")
             continue
         t = _finite(row[0])
         if t is None:
@@ -167,7 +167,7 @@ def unknown_columns(header: Sequence[str], known: Iterable[str], what: str) -> l
     """Return a fault for each name that is not known; `what` says what the names should be of."""
     names = dict.fromkeys(known)
     unknown = (c for c in header if c not in names)
-    return [f"column {c!r} is no {what} of the FMU: {near}" for c, near in hints(unknown, names)]
+    return [f"column {c!r} is not a {what} of the FMU: {near}" for c, near in hints(unknown, names)]
 
 
 def _rows(content: bytes, name: str) -> tuple[list[str], list[tuple[int, list[str]]]]:
@@ -177,10 +177,10 @@ def _rows(content: bytes, name: str) -> tuple[list[str], list[tuple[int, list[st
     except UnicodeDecodeError as e:
         raise InvalidTable(name, [f"it is not UTF-8: {e.reason} at byte {e.start}"]) from e
     except csv.Error as e:
-        raise InvalidTable(name, [f"it is no CSV: {e}"]) from e
+        raise InvalidTable(name, [f"it is not a CSV: {e}"]) from e
     if not rows or rows[0][1][0].strip().lower() != TIME:
         given = repr(rows[0][1][0][:40]) if rows else "nothing"
-        raise InvalidTable(name, [f"its first line begins with {given}; names, of which time is the first, are right"])
+        raise InvalidTable(name, [f"its first line begins with {given}; expected names, of which time is the first"])
     header = [cell.strip() for cell in rows[0][1][1:]]
     if twice := sorted({c for c in header if header.count(c) > 1}):
         raise InvalidTable(name, [f"column {c!r} is there twice" for c in twice])
@@ -196,7 +196,7 @@ def _parsed(port: FmuPort, text: str, *, in_range: bool) -> tuple[Any, str]:
     except ValueError as e:
         return 0, str(e)
     if isinstance(number, float) and not math.isfinite(number):
-        return 0, "a finite number is right"
+        return 0, "expected a finite number"
     if port.width is not None and not port.width.holds(number):
         return 0, f"it does not fit {port.width.range_text}"
     low, high = port.minimum, port.maximum

@@ -119,14 +119,14 @@ def parsed_number(port: FmuPort, text: str) -> int | float:
     """
     if port.kind is Kind.BOOLEAN:
         if text.lower() not in _BOOLEANS:
-            raise ValueError("true, false, 1 or 0 is right")
+            raise ValueError("expected true, false, 1 or 0")
         return _BOOLEANS[text.lower()]
     if port.kind is Kind.ENUMERATION:
         items = {name.upper(): value for name, value in port.items} | {str(value): value for _, value in port.items}
         if text.upper() not in items:
-            raise ValueError(f"one of {', '.join(name.lower() for name, _ in port.items)} is right")
+            raise ValueError(f"expected one of {', '.join(name.lower() for name, _ in port.items)}")
         return items[text.upper()]
     try:
         return int(text) if port.kind is Kind.INTEGER else float(text)
     except ValueError:
-        raise ValueError(f"a {'whole ' if port.kind is Kind.INTEGER else ''}number is right") from None
+        raise ValueError(f"expected a {'whole ' if port.kind is Kind.INTEGER else ''}number") from None

@@ -92,7 +92,7 @@ def _values_in(file: Any) -> int:
 
 def _check_size(path: Path, size: int, most: int) -> None:
     if size > most:
-        fault = f"it would take {size / _FREE:.3g} GiB of memory, over {_RATIO} times its size: it is no run's"
+        fault = f"it would take {size / _FREE:.3g} GiB of memory, over {_RATIO} times its size: it is not a run's"
         raise InvalidRecord(path, fault)
 
 

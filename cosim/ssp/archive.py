@@ -86,11 +86,11 @@ class SspArchive:
         """Return the member that a URI refers to from SystemStructure.ssd.
 
         Raises:
-            ValueError: it is no relative URI, leads out of the archive, or there is no such member.
+            ValueError: it is not a relative URI, leads out of the archive, or there is no such member.
         """
         parts = urlsplit(uri)
         if parts.scheme or parts.netloc or parts.path.startswith("/"):
-            raise ValueError(f"{uri!r} lies outside of the SSP; a relative URI, such as 'resources/unit.fmu', is right")
+            raise ValueError(f"{uri!r} lies outside of the SSP; expected a relative URI, such as 'resources/unit.fmu'")
         if parts.fragment or parts.query or not parts.path:
             raise ValueError(f"{uri!r} names no file of the SSP; 'resources/unit.fmu' is a valid one")
         member = posixpath.normpath(unquote(parts.path))

@@ -195,7 +195,9 @@ class _Flattening:
             kind = self._connectors[nodes[gives.index(None)]].kind
             self.flat.faults.append(f"{where}connectors of kind {kind!r} cannot be connected; inputs and outputs can")
         elif gives[0] == gives[1]:
-            self.flat.faults.append(f"{where}both ends {'give' if gives[0] else 'take'} a value; one of each is right")
+            self.flat.faults.append(
+                f"{where}both ends {'give' if gives[0] else 'take'} a value; connect an output with an input"
+            )
         else:
             source, target = nodes if gives[0] else reversed(nodes)
             if target in self._fed:

@@ -88,7 +88,7 @@ def read_parameter_set(part: SspPart, root: XmlElement, units: Mapping[str, Unit
 def _value(part: SspPart, parameter: XmlElement, units: Mapping[str, Unit]) -> SspValue:
     types = [c for c in parameter.children if local(c.tag) in _TYPES]
     if len(types) != 1:
-        valid = f"one of {', '.join(_TYPES)} is right"
+        valid = f"expected one of {', '.join(_TYPES)}"
         raise part.fault(parameter, f"parameter {part.text(parameter, 'name')!r} has {len(types)} types; {valid}")
     (element,) = types
     type_name = local(element.tag)

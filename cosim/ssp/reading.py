@@ -58,7 +58,7 @@ def read_structure(archive: SspArchive) -> SspStructure:
         part = SspPart(archive.path, archive.structure_name, archive.structure(), "ssd:SystemStructureDescription")
         systems = list(part.children(part.root, "ssd:System"))
         if len(systems) != 1:
-            raise part.fault(part.root, f"there are {len(systems)} outermost systems; one is right")
+            raise part.fault(part.root, f"there are {len(systems)} outermost systems; expected one")
         reader = _Reader(archive, part, read_units(part, part.root, "ssd"))
         system = reader.system(systems[0])
         return SspStructure(
@@ -80,7 +80,7 @@ def _times(part: SspPart) -> tuple[float, float | None]:
             return start, None
         stop = part.number(experiment, "stopTime")
         if stop <= start:
-            raise part.fault(experiment, f"the default experiment ends at {stop:g} s; above {start:g} s is right")
+            raise part.fault(experiment, f"the default experiment ends at {stop:g} s; expected above {start:g} s")
         return start, stop
     return 0.0, None
 

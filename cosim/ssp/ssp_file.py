@@ -76,7 +76,9 @@ class Grouping:
         if a is None or b is None:
             for port, node, role in ((a, c.source, "output"), (b, c.target, "input")):
                 if port is None:
-                    self.faults.append(f"{c.where}{'.'.join(node)} is no {role} of its FMU, so it cannot be connected")
+                    self.faults.append(
+                        f"{c.where}{'.'.join(node)} is not a {role} of its FMU, so it cannot be connected"
+                    )
             return
         if i is None and k is None and a.shape != b.shape:
             self.wires.append((source, target, c.linear))  # a fault, which the system's check reports with both ends

@@ -125,7 +125,7 @@ class SspPart:
             InvalidSsp: it has another name or version.
         """
         if root.tag != tag(wanted):
-            raise self.fault(root, f"<{short_name(root.tag)[:80]}> where <{wanted}> is right")
+            raise self.fault(root, f"expected <{wanted}>, not <{short_name(root.tag)[:80]}>")
         if root.get("version") not in VERSIONS:
             version = root.get("version")[:80] or "none"
             raise self.fault(root, f"the version of <{wanted}> is {version}; {' and '.join(VERSIONS)} can be read")

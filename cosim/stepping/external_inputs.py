@@ -53,13 +53,13 @@ class ExternalInput:
         """Take the source's value for the communication point at t, s.
 
         Raises:
-            InvalidExternalValue: it is no number, of another size, not finite, no whole number where the input takes
+            InvalidExternalValue: it is not a number, of another size, not finite, no whole number where the input takes
                 just those, or out of the input's range.
         """
         given = self._source.at(t)
         if given is None:
             return
-        entries, fault = _NO_ENTRIES, f"got {short_repr(given)}, which is no array of numbers"
+        entries, fault = _NO_ENTRIES, f"got {short_repr(given)}, which is not an array of numbers"
         with contextlib.suppress(ValueError):  # rows of different lengths are no array
             entries = np.asarray(given).ravel()
             fault = self._fault(entries)
@@ -80,7 +80,7 @@ class ExternalInput:
             right = "is" if self._port.size == 1 else "are"
             return f"got {len(entries)} values where {self._port.size} {right} right"
         if entries.dtype.kind not in "biuf":
-            return f"got {short_repr(entries.tolist())}, which is no array of numbers"
+            return f"got {short_repr(entries.tolist())}, which is not an array of numbers"
         if self._port.kind is not Kind.BOOLEAN and not np.isfinite(entries.astype(np.float64)).all():
             return f"got {entries.tolist()}, which is not finite"
         if self._port.items:
@@ -98,7 +98,7 @@ class ExternalInput:
 def _fault_of_integers(entries: NDArray[Any], dtype: np.dtype[Any]) -> str | None:
     """Return what is wrong with finite entries for an integer input, before they are cast to its type."""
     if (entries != np.round(entries)).any():
-        return f"got {entries.tolist()} where whole numbers are right"
+        return f"expected whole numbers, got {entries.tolist()}"
     limits = np.iinfo(dtype)
     if any(not limits.min <= n <= limits.max for n in entries.tolist()):
         return f"got {entries.tolist()}, which is out of range: from {limits.min} to {limits.max}"

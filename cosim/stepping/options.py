@@ -45,16 +45,16 @@ class AdaptiveStep:
 
     def __post_init__(self) -> None:
         given: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(self)}
-        exact = "a number of seconds is right that is exact, such as Fraction(1, 1000)"
-        faults = [f"{n} = {given[n]!r}: a number is right" for n in ("relative", "absolute") if not _is_real(given[n])]
+        exact = "expected an exact number of seconds, such as Fraction(1, 1000)"
+        faults = [f"{n} = {given[n]!r}: expected a number" for n in ("relative", "absolute") if not _is_real(given[n])]
         steps = {n: given[n] for n in ("smallest", "largest", "initial") if n == "smallest" or given[n] is not None}
         faults += [f"{name} = {step!r}: {exact}" for name, step in steps.items() if not isinstance(step, Rational)]
         if not _are_names(self.uncontrolled):
-            faults.append(f"uncontrolled = {self.uncontrolled!r}: a tuple of outputs, such as ('arm.p_WG',), is right")
+            faults.append(f"uncontrolled = {self.uncontrolled!r}: expected a tuple of outputs, such as ('arm.p_WG',)")
         if faults:
             raise InvalidOptions(faults)
         faults = [
-            f"the {name} tolerance is {value!r}; a number from 0 on is right"
+            f"the {name} tolerance is {value!r}; expected a number from 0 on"
             for name, value in (("relative", self.relative), ("absolute", self.absolute))
             if not (math.isfinite(value) and value >= 0)
         ]
@@ -188,7 +188,7 @@ class MasterOptions:
         }
         flags = ("cpu_times", "compiled", "repeat_discarded", "strict")
         checks |= {name: (isinstance(given[name], bool), "True or False") for name in flags}
-        faults = [f"{name} = {given[name]!r}: {valid} is right" for name, (fits, valid) in checks.items() if not fits]
+        faults = [f"{name} = {given[name]!r}: expected {valid}" for name, (fits, valid) in checks.items() if not fits]
         if faults:
             raise InvalidOptions(faults)
 

@@ -22,7 +22,7 @@ from handover.cosim.system.system import Connection, PortName, System
 class AlgebraicLoop:
     """Outputs that all depend on each other by direct feedthrough, and the connections through which they do.
 
-    A cycle of connections is no algebraic loop if one output in it has no direct feedthrough from the input that is
+    A cycle of connections is not an algebraic loop if one output in it has no direct feedthrough from the input that is
     part of the cycle, even if another output of the same unit has.
     """
 

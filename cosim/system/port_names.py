@@ -103,7 +103,7 @@ def check_end(end: Any, ports: str, units: Mapping[str, PlacedUnit]) -> None:
         units: those of the system, by name.
 
     Raises:
-        TypeError: it is no port, and not all outputs or inputs of a unit.
+        TypeError: it is not a port, and not all outputs or inputs of a unit.
         ValueError: it is all of a unit that the system does not have.
     """
     if isinstance(end, PlacedUnit):

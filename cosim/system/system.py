@@ -87,9 +87,9 @@ class System:
             TypeError: the period is not exact, or another argument is of another type.
         """
         if not isinstance(name, str):  # type: ignore
-            raise TypeError(f"name = {name!r:.60}: a text is right, such as 'arm'")
+            raise TypeError(f"name = {name!r:.60}: expected a text, such as 'arm'")
         if not isinstance(fmu, (str, PathLike, FmuDescription)):  # type: ignore
-            raise TypeError(f"unit {name}: fmu = {fmu!r:.60}: the path of an FMU is right, such as 'arm.fmu'")
+            raise TypeError(f"unit {name}: fmu = {fmu!r:.60}: expected the path of an FMU, such as 'arm.fmu'")
         description = fmu if isinstance(fmu, FmuDescription) else self._described(Path(fmu))
         if name in self.units:
             self._faults.append(f"two units are called {name!r}")
@@ -317,7 +317,7 @@ class System:
         """
         _check_port(target)
         if not isinstance(series, TimeSeries):  # type: ignore
-            raise TypeError(f"{target} cannot follow {series!r:.60}: a TimeSeries is right, as of Record.series")
+            raise TypeError(f"{target} cannot follow {series!r:.60}: expected a TimeSeries, as of Record.series")
         self._forget_matches(target)
         self.followed[target] = series
 
@@ -337,7 +337,7 @@ class System:
         """
         _check_port(target)
         if source is not None and not callable(getattr(source, "at", None)):
-            raise TypeError(f"{target} cannot come from {source!r:.60}: an object with a method at(t) is right")
+            raise TypeError(f"{target} cannot come from {source!r:.60}: expected an object with a method at(t)")
         self._forget_matches(target)
         self.externals[target] = NoSource() if source is None else source
 

@@ -37,7 +37,7 @@ class TimeSeries:
         if self.times.ndim != 1 or not len(self.times):
             raise ValueError("a series needs one time at least")
         if self.values.ndim != 2 or len(self.values) != len(self.times):
-            raise ValueError(f"values of shape {self.values.shape} for {len(self.times)} times: a row a time is right")
+            raise ValueError(f"values of shape {self.values.shape} for {len(self.times)} times: expected a row a time")
         if not (np.isfinite(self.times).all() and np.isfinite(np.asarray(self.values, dtype=np.float64)).all()):
             raise ValueError("times and values must be finite")
         if (np.diff(self.times) < 0).any():

@@ -26,7 +26,7 @@ def value_faults(unit: str, description: FmuDescription, start: Mapping[str, Any
 
 
 def clock_mismatch(a: FmuClock | None, b: FmuClock | None) -> str | None:
-    """Return why two clocks cannot be connected, or None if they can; an end that is no clock is None."""
+    """Return why two clocks cannot be connected, or None if they can; an end that is not a clock is None."""
     if a is None or b is None:
         return "a clock can be connected with a clock only"
     if a.is_input or not b.is_input:
@@ -59,7 +59,7 @@ def mismatch(a: FmuPort, b: FmuPort) -> str | None:
 def doubt(a: FmuPort, b: FmuPort, transformation: LinearTransformation | None = None) -> str | None:
     """Return what is not as it should be between an output and an input that it can feed, or None."""
     if (a.kind, b.kind) == _WHOLE:
-        return "an integer is no enumeration, and must be one of its numbers"
+        return "an integer is not an enumeration, and must be one of its numbers"
     if a.shape != b.shape:
         return "their shapes differ, though each has one value"
     defined, unknown = (a.unit.defined, b.unit.defined), needs_no_conversion(a.unit, b.unit)

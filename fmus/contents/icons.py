@@ -55,7 +55,7 @@ def block_icon(entry: Entry) -> Icon:
         return _read(_OF_ANY_BLOCK)
     icon = vars(owner)["icon"]
     if not isinstance(icon, str):
-        raise InvalidIcon(entry.block, icon, "that is no text")
+        raise InvalidIcon(entry.block, icon, "that is not a text")
     folder = Path(inspect.getfile(owner)).resolve().parent
     file = (folder / icon).resolve()
     if not file.is_relative_to(folder) or not file.is_file():

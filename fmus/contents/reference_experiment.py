@@ -137,7 +137,7 @@ class RecordedExperiment:
         s = self.setup
         allowed = (
             f"Tolerance: {s.relative:g} of the largest value that a variable has in the result (of a Float32 2**-23 at "
-            f"least), plus {s.absolute:g} in its unit; what is no real number is equal. {self.tolerance.text}"
+            f"least), plus {s.absolute:g} in its unit; what is not a real number is equal. {self.tolerance.text}"
         )
         lines = [
             f"{stimulus} has the inputs, {self.origin}: columns of CSV, time in seconds and entries named as",
@@ -289,7 +289,7 @@ def read_stimulus(file: Path, columns: Mapping[str, Column]) -> SignalTable:
     """Return a stimulus from a CSV file.
 
     Raises:
-        InvalidTable: it is no CSV, names what is no input, has values that its inputs cannot have, or has less than two
+        InvalidTable: it is not CSV, names what is no input, has values that its inputs cannot have, or has less than 2
             rows or times that do not rise.
         OSError: it cannot be read.
     """
@@ -298,7 +298,7 @@ def read_stimulus(file: Path, columns: Mapping[str, Column]) -> SignalTable:
         raise InvalidTable(name, lacking)
     table = read_table(content, name, columns, in_range=True)
     if len(table.times) < 2:
-        raise InvalidTable(name, ["it has one row; the last row's time is the end, so at least two are right"])
+        raise InvalidTable(name, ["it has one row; expected at least two, as the last row's time is the end"])
     return table
 
 

@@ -111,7 +111,7 @@ def related_files(
 
 def _check_name(unit: str, name: str, names: Sequence[str]) -> None:
     if not _FILE_NAME.fullmatch(name):
-        right = "ASCII letters, digits, '_', '-' and, after the first, '.' are right"
+        right = "expected ASCII letters, digits, '_', '-' and, after the first, '.'"
         raise InvalidParameterSet(unit, name, [f"a set's name is that of a file; {right}"])
     if [n.lower() for n in names].count(name.lower()) > 1:
         raise InvalidParameterSet(unit, name, ["two sets have this name, and so would their files"])

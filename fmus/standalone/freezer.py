@@ -105,7 +105,7 @@ def _contents(folder: Path) -> dict[str, bytes]:
             target = path.resolve()
             if path.is_symlink() and (not target.exists() or path.is_relative_to(target)):
                 leads = f"the symbolic link {path.relative_to(folder)} to {os.readlink(path)}"
-                raise CannotFreeze(f"PyInstaller has made {leads}, which is no file that an FMU can contain")
+                raise CannotFreeze(f"PyInstaller has made {leads}, which is not a file that an FMU can contain")
             if path.is_symlink() and target.name == path.name and target.parent.name.endswith((".libs", ".dylibs")):
                 moved.add(target)
             if target.is_file():

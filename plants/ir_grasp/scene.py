@@ -21,14 +21,14 @@ _CHECKPOINT = 500  # internal steps after which the world is rebuilt from its ow
 
 
 class StepSizeError(ValueError):
-    """A step is no multiple of the internal time step; nothing has changed."""
+    """A step is not a multiple of the internal time step; nothing has changed."""
 
     is_refusal = True
 
     def __init__(self, dt: float) -> None:
         steps = max(int(dt / DT), 1)
         super().__init__(
-            f"GraspScene: a step of {dt:.6g} s is no multiple of the internal step {DT:g} s; "
+            f"GraspScene: a step of {dt:.6g} s is not a multiple of the internal step {DT:g} s; "
             f"{steps * DT:.6g} s or {(steps + 1) * DT:.6g} s would fit"
         )
         self.dt = dt

@@ -83,13 +83,13 @@ _LIKE_AN_ARGUMENT = 0.7
 
 
 def _meant_arguments(unknown: Sequence[str], function: Callable[..., Any], elsewhere: Mapping[str, str]) -> list[str]:
-    """Return a hint for each keyword that is no parameter, and is an argument elsewhere or like one's name."""
+    """Return a hint for each keyword that is not a parameter, and is an argument elsewhere or like one's name."""
     own = {p.name: p.name for p in signature(function).parameters.values() if p.kind is Parameter.KEYWORD_ONLY}
     of_master = {f.name: f"options=handover.MasterOptions({f.name}=...)" for f in fields(MasterOptions)}
     arguments = {**(of_master if "options" in own else {}), **own}
     near = {n: get_close_matches(n, arguments, 1, _LIKE_AN_ARGUMENT) for n in unknown if n not in elsewhere}
     return [f"{n}: {elsewhere[n]}" for n in unknown if n in elsewhere] + [
-        f"if {n!r} is meant as an argument, {arguments[names[0]]} is right" for n, names in near.items() if names
+        f"as an argument, {n!r} is spelt {arguments[names[0]]}" for n, names in near.items() if names
     ]
 
 
@@ -148,7 +148,7 @@ def single_texts(subject: object, values: Mapping[str, Any]) -> list[str]:
     """Return parameters of one run as texts `NAME=VALUE`.
 
     Raises:
-        InvalidInput: a list is given for a scenario's parameter that is no array.
+        InvalidInput: a list is given for a scenario's parameter that is not an array.
         UsageError: there is no such scenario.
     """
     if is_scenario(subject):
@@ -174,7 +174,7 @@ def of_type(name: str, value: Any, types: type | tuple[type, ...], right: str) -
         InvalidInput: it is of another one.
     """
     if not isinstance(value, types):
-        raise InvalidInput(f"{name} = {value!r:.60}: {right} is right")
+        raise InvalidInput(f"{name} = {value!r:.60}: expected {right}")
     return value
 
 
@@ -194,7 +194,7 @@ def path_of(name: str, value: Any) -> Path:
     """
     right = "a path, as a text or a Path,"
     if value == "" or "\0" in str(value):
-        raise InvalidInput(f"{name} = {value!r:.60}: {right} is right")
+        raise InvalidInput(f"{name} = {value!r:.60}: expected {right}")
     return Path(of_type(name, value, (str, os.PathLike), right))
 
 
@@ -218,13 +218,13 @@ def merged(parameters: Mapping[str, Any] | None, named: Mapping[str, Any]) -> di
     """Return the parameters of a call: those by keyword, and those of its mapping.
 
     Raises:
-        InvalidInput: some are given both ways, or it is no mapping.
+        InvalidInput: some are given both ways, or it is not a mapping.
     """
     given = _mapping("parameters", parameters, "{'servo.gain': 0.5}")
     if "unit" in named:
         raise InvalidInput("unit: what takes the place of units is given as units={'servo': 'my_servo:MyServo'}")
     if both := [name for name in named if name in given]:
-        raise InvalidInput(f"{', '.join(both)}: given by keyword and in parameters={{...}}; one of both is right")
+        raise InvalidInput(f"{', '.join(both)}: given by keyword and in parameters={{...}}; give one of them")
     return {**given, **named}
 
 
@@ -232,7 +232,7 @@ def unit_texts(units: Mapping[str, Path | str | Sequence[Path | str]] | None) ->
     """Return replacements of units as texts `NAME=FILE`, several as `NAME=A,B`.
 
     Raises:
-        InvalidInput: it is no mapping.
+        InvalidInput: it is not a mapping.
     """
     given = _mapping("units", units, "{'servo': 'my_servo:MyServo'}")
     return [f"{name}={text_of_value(files)}" for name, files in given.items()]
@@ -249,7 +249,7 @@ def positive_seconds(name: str, seconds: Seconds) -> Fraction:
         InvalidInput: it is not a finite number above 0.
     """
     if not 0 < _number_of(seconds) < math.inf:
-        raise InvalidInput(f"{name} = {seconds!r:.60}: a finite number of seconds above 0 is right")
+        raise InvalidInput(f"{name} = {seconds!r:.60}: expected a finite number of seconds above 0")
     return _kept(name, seconds)
 
 
@@ -257,7 +257,7 @@ def _kept(name: str, seconds: Seconds) -> Fraction:
     """Return a finite number of seconds exactly, if a run's folder keeps it."""
     exactly = seconds if isinstance(seconds, Fraction) else exact_seconds(float(seconds))
     if not is_exact_time(exactly):
-        limits = "a number of seconds below 1e308, and not finer than 1e-307, is right"
+        limits = "expected a number of seconds below 1e308, and not finer than 1e-307"
         raise InvalidInput(f"{name} = {float(exactly):g}: {limits}")
     return exactly
 
@@ -276,7 +276,7 @@ def exact_time(name: str, seconds: Seconds | None) -> Fraction | None:
     if seconds is None:
         return None
     if not math.isfinite(_number_of(seconds)):
-        raise InvalidInput(f"{name} = {seconds!r:.60}: a finite number of seconds is right")
+        raise InvalidInput(f"{name} = {seconds!r:.60}: expected a finite number of seconds")
     return _kept(name, seconds)
 
 
@@ -288,7 +288,7 @@ def whole_number(name: str, value: Any, least: int = 0) -> int:
     """
     is_whole = isinstance(value, (int, np.integer)) and not isinstance(value, (bool, np.bool_))
     if not is_whole or not least <= value <= GREATEST_SEED:
-        raise InvalidInput(f"{name} = {value!r:.60}: a whole number from {least} to {GREATEST_SEED} is right")
+        raise InvalidInput(f"{name} = {value!r:.60}: expected a whole number from {least} to {GREATEST_SEED}")
     return int(cast(Any, value))
 
 

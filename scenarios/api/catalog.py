@@ -43,7 +43,7 @@ def unit(name: str, fmi: Literal[2, 3] = 3) -> Path:
     """
     of_type("name", name, str, "the name of a unit, or the path of a block such as 'my_arm:MyArm',")
     if fmi not in (2, 3):
-        raise InvalidInput(f"fmi = {fmi!r:.60}: 2 or 3 is right")
+        raise InvalidInput(f"fmi = {fmi!r:.60}: expected 2 or 3")
     if ":" in name:
         search_folder(Path.cwd())
     try:
@@ -57,7 +57,7 @@ def describe(fmu: str | Path) -> FmuDescription:
     """Return what an FMU declares, which a notebook shows as a table: of a file, or of a unit as `unit` takes it.
 
     Raises:
-        InvalidInput: it is no valid FMU, or no unit of that name.
+        InvalidInput: it is not a valid FMU, or no unit of that name.
     """
     with errors_for_python():
         path = path_of("fmu", fmu)
@@ -102,7 +102,7 @@ def load(folder: Path | str) -> Run | Campaign:
         return Campaign(path)
     if path.is_file():
         raise InvalidInput(
-            f"{path}: it is a file; the folder of a run or of a campaign is right, such as {path.parent}"
+            f"{path}: it is a file; expected the folder of a run or of a campaign, such as {path.parent}"
         )
     if not _has_results(path):
         raise InvalidInput(f"{path} {OF_NEITHER}" if path.is_dir() else f"{path}: {nothing_at(path, _has_results)}")

@@ -59,7 +59,7 @@ class ScenarioEnvironment(gymnasium.Env[Values, Values]):
     ) -> None:  # fmt: skip
         of_type("place", place, str, "the name of a unit")
         if reward is not None and not callable(reward):
-            raise InvalidInput(f"reward = {reward!r:.60}: a function of the session is right")
+            raise InvalidInput(f"reward = {reward!r:.60}: expected a function of the session")
         with errors_for_python(), ExitStack() as opened:
             request.check_options()
             self._request, self._asked = request, request.open(opened)
@@ -116,7 +116,7 @@ class ScenarioEnvironment(gymnasium.Env[Values, Values]):
         if session is None:
             raise RuntimeError("there is no episode: call reset first")
         if not isinstance(action, Mapping):  # type: ignore
-            raise InvalidInput(f"action = {action!r}: a mapping is right, with {', '.join(self._actions)}")
+            raise InvalidInput(f"action = {action!r}: expected a mapping, with {', '.join(self._actions)}")
         if missing := [name for name in self._actions if name not in action]:
             raise InvalidInput(f"the action has no {', '.join(missing)}")
         for name, port in self._actions.items():

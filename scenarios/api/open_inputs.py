@@ -88,7 +88,7 @@ class OpenSystem:
         """Set a free input, in its own unit.
 
         Raises:
-            InvalidInput: it is no value of the input.
+            InvalidInput: it is not a value of the input.
         """
         unit, port = self.split(name)
         self.free[name].set(checked_numbers(name, self.system.units[unit].description.inputs[port], value))
@@ -97,7 +97,7 @@ class OpenSystem:
         """Set an output of the unit that is left out, and the inputs that it fed.
 
         Raises:
-            InvalidInput: it is no value of the output.
+            InvalidInput: it is not a value of the output.
         """
         assert self.place is not None, "a unit is left out"
         place = self.place
@@ -116,7 +116,7 @@ class OpenSystem:
         units = [*self.system.units, *(() if self.place is None else (self.place.unit.name,))]
         owner = max((u for u in units if str(name).startswith(f"{u}.")), key=len, default=None)
         if owner is None and name in units:
-            raise KeyError(f"{name!r} is a unit; one of its ports is right, such as '{name}.port'")
+            raise KeyError(f"{name!r} is a unit; expected one of its ports, such as '{name}.port'")
         if owner is None:
             raise KeyError(f"no unit in {name!r}, such as 'unit.port'; {nearest(str(name).partition('.')[0], units)}")
         return owner, name[len(owner) + 1 :]

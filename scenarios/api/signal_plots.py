@@ -46,7 +46,7 @@ def plot_signals(signals: SignalTable, names: Sequence[str], axes: Axes | None =
     if unknown := [n for n in names if n not in signals and _element(signals, n) is None]:
         raise KeyError("; ".join(f"no signal {n!r}: {nearest(n, signals)}" for n in unknown))
     if axes is not None and len(names) > 1:
-        raise ValueError(f"{len(names)} signals for one pair of axes; one is right")
+        raise ValueError(f"{len(names)} signals for one pair of axes; expected one")
     with own_style():
         if axes is not None:
             _draw(axes, signals, names[0])

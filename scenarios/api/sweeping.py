@@ -106,7 +106,7 @@ def sweep(
     with errors_for_python(named, sweep):
         require_extra("campaigns", "campaigns")
         if workers is not None and scheduler is not None:
-            raise InvalidInput("workers and scheduler: a scheduler has workers of its own; one of both is right")
+            raise InvalidInput("workers and scheduler: a scheduler has workers of its own; give one of them")
         if scheduler is not None:
             of_type("scheduler", scheduler, str, "an address such as 'tcp://10.0.0.5:8786'")
         pool = PoolConfig(None if workers is None else whole_number("workers", workers, 1), scheduler)

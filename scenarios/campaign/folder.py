@@ -47,7 +47,7 @@ PARAMETER_UNITS = "parameter_units"
 """Key of the units of measurement of units' parameters, by `UNIT.NAME`, as their FMUs declare them."""
 
 OF_NEITHER = f"is the folder of neither a run (no run.json) nor a campaign (no {_FILE})"
-"""What is said of a folder where a run's or a campaign's is right."""
+"""What is said of a folder where a run's or a campaign's is expected."""
 
 
 class CampaignMasterData(MasterData):

@@ -57,7 +57,7 @@ def set_parameters(
     """
     fixed, faults = _texts_by_name(experiment, given, "name=value")
     both = [name for name in fixed if any(name in point for point in varied)]
-    faults += [f"{name} is varied and set by -p; one of both is right" for name in both]
+    faults += [f"{name} is varied and set by -p; give one of them" for name in both]
     known, settable = {v.name: v for v in experiment.parameters()}, settable_of(experiment)
     for name, text in fixed.items():
         port = None if settable is None else settable.port(name)

@@ -65,7 +65,7 @@ def _parameter_files(plan: CampaignPlan) -> dict[str, dict[str, str]]:
 def differences(stored: Mapping[str, Any], requested: Mapping[str, Any]) -> list[str]:
     """Return in what the campaign of a folder and that of the command differ, with both values.
 
-    A larger number of repetitions is no difference: it adds runs to the same campaign.
+    A larger number of repetitions is not a difference: it adds runs to the same campaign.
     """
     different: list[str] = []
     for key, value in requested.items():

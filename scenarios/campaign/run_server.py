@@ -63,7 +63,7 @@ class RunServer:
         """Run jobs until there are no more.
 
         Raises:
-            InvalidState: what came is no job.
+            InvalidState: what came is not a job.
         """
         while self._job_comes():
             try:

@@ -14,7 +14,7 @@ from handover.scenarios.execution.errors import PoolError
 _CONNECT_TIMEOUT, _GREETING_TIMEOUT = 3.0, 3.0
 """How long a plain connection to a server may take, and how long its first byte, s."""
 
-RIGHT = "tcp://HOST:PORT, as `dask scheduler` prints it, is right"
+RIGHT = "expected tcp://HOST:PORT, as `dask scheduler` prints it"
 
 
 def probe_port(address: str, host: str, port: int) -> None:
@@ -39,7 +39,7 @@ def probe_port(address: str, host: str, port: int) -> None:
     except OSError as e:
         raise PoolError(f"no scheduler can be reached at {address}: {one_line(e)}; {RIGHT}") from e
     if not greeted:
-        raise PoolError(f"{address} is no Dask scheduler: it hangs up; {RIGHT}")
+        raise PoolError(f"{address} is not a Dask scheduler: it hangs up; {RIGHT}")
 
 
 _DASK_CONNECT_TIMEOUT, _ANSWER_TIMEOUT = 4.0, 5.0
@@ -64,7 +64,7 @@ def scheduler_address(text: str) -> str:
     except OSError as e:
         raise PoolError(f"no scheduler can be reached at {address}: {one_line(e)}; {RIGHT}") from e
     except Exception as e:  # bytes of another protocol may raise anything
-        raise PoolError(f"{address} is no Dask scheduler: {one_line(e)}; {RIGHT}") from e
+        raise PoolError(f"{address} is not a Dask scheduler: {one_line(e)}; {RIGHT}") from e
     if kind != "Scheduler":
         raise PoolError(f"{address} is a {kind}, not a scheduler; {RIGHT}")
     return address

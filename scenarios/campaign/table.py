@@ -54,7 +54,7 @@ class CampaignTable:
         for name in table.column("run") if "run" in table.table.column_names else ():
             is_name = isinstance(name, str) and not name.startswith(".") and safe_name(name) == name
             if not is_name or len(name) > _LONGEST_NAME:  # not in the folder
-                raise InvalidRunFolder(file.parent, f"its {file.name} is damaged: {name!r:.60} is no run's name")
+                raise InvalidRunFolder(file.parent, f"its {file.name} is damaged: {name!r:.60} is not a run's name")
         return table
 
     def __len__(self) -> int:

@@ -88,7 +88,7 @@ def read_message(pipe: BinaryIO) -> Any:
     head = pipe.read(8)
     size = int.from_bytes(head, "big")
     if len(head) == 8 and size > _LONGEST:
-        raise InvalidState(f"what came through the pipe is no message: it begins with {head!r}")
+        raise InvalidState(f"what came through the pipe is not a message: it begins with {head!r}")
     packed = pipe.read(size)
     if len(head) < 8 or len(packed) < size:
         raise EOFError

@@ -214,7 +214,7 @@ def pool_config(workers: int | None, scheduler: str | None) -> PoolConfig:
         UsageError: both are given.
     """
     if workers is not None and scheduler is not None:
-        raise UsageError("--workers and --scheduler: a scheduler has workers of its own; one of both is right")
+        raise UsageError("--workers and --scheduler: a scheduler has workers of its own; give one of them")
     return PoolConfig(workers, scheduler)
 
 

@@ -167,7 +167,7 @@ def read_config(path: Path, ctx: click.Context) -> ConfigFile:
             if key in tables:
                 texts[tables[key]] = list(_texts(key, value))
             elif key in options and options[key].name in defaults:
-                faults.append(f"{key}: another spelling of it is given, too; one of both is right")
+                faults.append(f"{key}: another spelling of it is given, too; give one of them")
             elif key in options:
                 defaults[str(options[key].name)] = _checked(options[key], ctx, value)
             elif key in _TABLES:
@@ -230,14 +230,14 @@ def _checked(option: click.Parameter, ctx: click.Context, value: Any) -> Any:
     """
     if isinstance(option, click.Option) and option.is_flag:
         if not isinstance(value, bool):
-            raise click.BadParameter("true or false is right")
+            raise click.BadParameter("expected true or false")
         return value
     several = isinstance(option, click.Option) and option.multiple
     values = cast(list[Any], value) if several and isinstance(value, list) else [value]
     is_text = isinstance(option.type, (click.types.StringParamType, click.Path, click.Choice))
     if any(isinstance(v, bool) or not isinstance(v, str if is_text else (str, int, float)) for v in values):
         right = "a text in quotes" if is_text else "a number, or a text that is one,"
-        raise click.BadParameter(f"{right} is right" + (", or several in [...]" if several else ""))
+        raise click.BadParameter(f"expected {right}" + (", or several in [...]" if several else ""))
     texts = [_text(v) for v in values]
     given = texts if several else texts[0]
     option.type_cast_value(ctx, given)
@@ -251,13 +251,13 @@ def _texts(key: str, table: Any) -> Iterator[str]:
         ValueError: it is none, or has a value of another type.
     """
     if not isinstance(table, dict):
-        raise ValueError(f"{key} = {_short(table)}: a table by name is right, such as [{key}]")
+        raise ValueError(f"{key} = {_short(table)}: expected a table by name, such as [{key}]")
     for name, value in _leaves(cast(dict[str, Any], table)):
         entries = list(_flat(value))
         if any(not isinstance(v, (str, int, float)) for v in entries):
-            raise ValueError(f"{key}.{name} = {_short(value)}: texts, numbers, true, false and lists of them are right")
+            raise ValueError(f"{key}.{name} = {_short(value)}: expected texts, numbers, true, false and lists of them")
         if key == "unit" and any(not isinstance(v, str) for v in entries):
-            raise ValueError(f"{key}.{name} = {_short(value)}: a text in quotes is right")
+            raise ValueError(f"{key}.{name} = {_short(value)}: expected a text in quotes")
         if key != "sweep" or not isinstance(value, list):
             yield f"{name}={','.join(map(_text, entries))}"
             continue

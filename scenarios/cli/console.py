@@ -62,7 +62,7 @@ def reserve_stdout() -> TextIO:
     try:
         if sys.stdout.fileno() != _STDOUT:
             return sys.stdout
-    except (OSError, ValueError):  # it is no file of the system, as where a program calls the command
+    except (OSError, ValueError):  # it is not a file of the system, as where a program calls the command
         return sys.stdout
     sys.stdout.flush()
     kept = copied(_STDOUT)

@@ -48,7 +48,7 @@ def export_command(
         values, of_units = split_parameters(experiment, parameters)
         check_effects(experiment, values)
         if file.suffix.lower() != ".ssp":
-            raise UsageError(f"--ssp {file}: a name that ends with .ssp is right; other tools know the file by it")
+            raise UsageError(f"--ssp {file}: expected a name that ends with .ssp; other tools know the file by it")
         check_new_file(f"--ssp {file}", file, force=force)
         others = replacements(experiment, replaced)
         with doing("building units"):

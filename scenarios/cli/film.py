@@ -42,7 +42,7 @@ class Size(click.ParamType):  # type: ignore (generic in newer versions only)
         size = (int(found[1]), int(found[2])) if found else (0, 0)
         if any(n % 2 or not SMALLEST <= n <= LARGEST for n in size):
             self.fail(
-                f"{value!r} is no size, such as 1280x720: two even numbers from {SMALLEST} to {LARGEST}", param, ctx
+                f"{value!r} is not a size, such as 1280x720: two even numbers from {SMALLEST} to {LARGEST}", param, ctx
             )
         return size
 
@@ -98,7 +98,7 @@ def film(
     """Make a film of a run."""
     with one_line_errors():
         if not folder.is_dir():
-            raise UsageError(f"{folder} is no folder; name that of a run")
+            raise UsageError(f"{folder} is not a folder; name that of a run")
         require_extra("film", "the film")
         run, path = _run(folder), file or folder / "film.mp4"
         _check(path, plots, fps, force=force, no_plots=no_plots)

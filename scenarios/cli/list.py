@@ -210,7 +210,9 @@ def checked_ports_of_place(experiment: type[Experiment[Any]], name: str, own: En
     try:
         return ports_of_place(experiment.places[name], own)
     except KeyError as e:
-        raise UsageError(f"{experiment.name}, place {name}: {e.args[0]!r} is no port or parameter of {own.name}") from e
+        raise UsageError(
+            f"{experiment.name}, place {name}: {e.args[0]!r} is not a port or parameter of {own.name}"
+        ) from e
     except UnknownBlock as e:
         raise UsageError(f"unit {name}: {e}") from e
 

@@ -161,7 +161,7 @@ def _unit_tolerances(texts: Sequence[str]) -> dict[str, float]:
         except ValueError:
             tolerance = math.nan
         if not (unit and 0 < tolerance < math.inf):
-            raise UsageError(f"--unit-tolerance {text!r}: UNIT=NUMBER or NUMBER is right, above 0, such as 1e-6")
+            raise UsageError(f"--unit-tolerance {text!r}: expected UNIT=NUMBER or NUMBER, above 0, such as 1e-6")
         if unit in found:
             raise UsageError(f"--unit-tolerance: {unit} is given twice")
         found[unit] = tolerance

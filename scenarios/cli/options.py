@@ -97,7 +97,7 @@ class WholeNumber(click.IntRange):
         except (TypeError, ValueError, OverflowError):
             number = None
         if number is None or (isinstance(value, float) and not value.is_integer()):
-            self.fail(f"{value!r:.60} is no whole number.", param, ctx)
+            self.fail(f"{value!r:.60} is not a whole number.", param, ctx)
         if self.max is not None and number > self.max:
             self.fail(f"{value!s:.60} is not in the range {self._describe_range()}.", param, ctx)
         return int(super().convert(number, param, ctx))

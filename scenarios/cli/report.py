@@ -35,7 +35,7 @@ def report(folder: Path, figures: bool, runs: bool, file: Path | None) -> None:
     """Write the page of a run or of a campaign."""
     with one_line_errors():
         if not folder.is_dir():
-            raise UsageError(f"{folder} is no folder; name that of a run or of a campaign")
+            raise UsageError(f"{folder} is not a folder; name that of a run or of a campaign")
         page = file or folder / "report.html"
         if page.is_dir():
             raise UsageError(f"{page} is a folder; name a file for the page")

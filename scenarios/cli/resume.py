@@ -48,9 +48,9 @@ def resume(
         contextlib.ExitStack() as opened,
     ):
         if not folder.is_dir():
-            raise UsageError(f"{folder} is no folder; name that of a run")
+            raise UsageError(f"{folder} is not a folder; name that of a run")
         run_folder = RunFolder.of_run(folder)
-        run_folder.read_run()  # what is no run's folder is told before what is missing here
+        run_folder.read_run()  # what is not a run's folder is told before what is missing here
         if not no_report:
             require_extra("reports", "report and figures", "--no-report")
         opened.enter_context(run_folder.held())

@@ -227,7 +227,7 @@ def run(
         if live or controls:
             task, control, observer = opened.enter_context(_live(task, pace, controls, webcam))
         elif task.inputs is None and task.experiment.led_hand(task.parameters) is not None:
-            say("nobody leads the hand, which stays where it is: --live lets a page lead it")
+            say("no hand input: the hand stays at its start: --live lets a page lead it")
         with contextlib.ExitStack() as bar:
             progress, ending = bar.enter_context(progress_bar(sys.stderr)), RunEnding(task, bar, json_to)
             result = run_task(task, progress, interruption, None, control, observer, ending.concluded)

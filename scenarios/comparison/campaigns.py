@@ -100,7 +100,7 @@ class ComparedCampaigns(CampaignResults):
         return self._chosen or super().shown_metrics or self.measured[:_MAX_METRICS]
 
     def words(self, parameter: str, text: str) -> str:
-        """Return a value that is no number as one reads it; a campaign's name as it was given."""
+        """Return a value that is not a number as one reads it; a campaign's name as it was given."""
         return text if parameter == ENTRY else super().words(parameter, text)
 
     def at(self, key: Key) -> Mapping[str, PointResults]:

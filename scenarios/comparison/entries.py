@@ -129,7 +129,7 @@ def read_entries(
                 run = RunFolder.of_run(folder)
                 runs.append(RunEntry(name, folder, RunFacts.read(run), record_of(run)))
             else:
-                what = OF_NEITHER if folder.is_dir() else "is no folder"
+                what = OF_NEITHER if folder.is_dir() else "is not a folder"
                 faults.append(f"{folder} {what}; name folders of runs, or of campaigns")
         except InvalidRunFolder as e:
             faults.append(f"{folder}: {e.fault}")

@@ -207,5 +207,5 @@ def _metrics(signals: Path, prefix: str) -> dict[str, Metric]:
 
 
 def _not_finite(value: float) -> str:
-    """Return that a value, for which a summary has a dash, is no number."""
+    """Return that a value, for which a summary has a dash, is not a number."""
     return "" if math.isfinite(value) else ", which is not a number" if math.isnan(value) else ", which is infinite"

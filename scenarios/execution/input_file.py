@@ -45,7 +45,7 @@ class InputTable:
         """Return a line for each name of which nothing would come if it had a start value: the table has it all."""
         covered = {*self.columns}
         covered |= {p.name for p in ports.values() if p.name in self.series and covered.issuperset(element_names(p))}
-        return [f"{name}: the table of inputs gives it; one of both is right" for name in names if name in covered]
+        return [f"{name}: the table of inputs gives it; give one of them" for name in names if name in covered]
 
     def notes(self, start: float, stop: float) -> list[str]:
         """Return a line if none of several times lies within the run, so that inputs stay at one value."""
@@ -84,7 +84,7 @@ def read_inputs(path: Path, inputs: Mapping[str, FmuPort], start: Mapping[str, A
     (_, header), *lines = rows
     names = [name.strip() for name in header]
     if len(names) == 1 and (found := next((c for c in ";\t" if c in names[0]), None)):
-        raise UsageError(f"{path}: its cells are separated by {found!r}; commas are right, and points in numbers")
+        raise UsageError(f"{path}: its cells are separated by {found!r}; expected commas, and points in numbers")
     columns = _columns(path, names, inputs)
     if not lines:
         raise UsageError(f"{path}: there is no line of numbers after the names")
@@ -108,7 +108,7 @@ def value_of(port: FmuPort, text: str) -> int | float:
     """Return one entry of a port that is a number, a boolean or an enumeration, from its text.
 
     Raises:
-        ValueError: it is none, or out of range; the message says what is right.
+        ValueError: it is none, or out of range; the message says what is expected.
     """
     return _value(port, text.strip())
 
@@ -125,7 +125,7 @@ def _columns(path: Path, names: Sequence[str], inputs: Mapping[str, FmuPort]) ->
             faults.append(f"the input {n!r} is a {inputs[n].kind.value}, which cannot follow values over time")
         elif n in inputs:
             entries = [name for name, (port, _) in valid.items() if port.name == n]
-            faults.append(f"the input {n!r} is an array: columns {entries[0]} to {entries[-1]} are right")
+            faults.append(f"the input {n!r} is an array: expected columns {entries[0]} to {entries[-1]}")
         else:
             near = nearest(n, valid) if len(faults) < MOST_FAULTS else ""
             faults.append(f"no input {n!r}; {near}")
@@ -146,7 +146,7 @@ def _numbers(
             if not math.isfinite(value):
                 raise ValueError("it is not finite")
         except ValueError as e:
-            reason = f"; {e}" if convert is not float else "; a finite number is right"
+            reason = f"; {e}" if convert is not float else "; expected a finite number"
             faults.append(f"line {line}, column {column!r}: {cell[:40]!r}{reason}")
             value = 0
         values.append(value)

@@ -271,9 +271,9 @@ def check_subject(subject: object) -> None:
     """
     if isinstance(subject, type):
         if not issubclass(subject, Experiment):
-            raise UsageError(f"{subject.__name__} is no scenario: a subclass of Experiment is")
+            raise UsageError(f"{subject.__name__} is not a scenario: a subclass of Experiment is")
         if missing := sorted(getattr(cast(Any, subject), "__abstractmethods__", ())):
             raise UsageError(f"{subject.__name__} is not complete: it has no {', '.join(missing)}")
     elif not isinstance(subject, (str, System)):
-        right = "a scenario's name or class, a system, or the path of an SSP or FMU is right"
+        right = "expected a scenario's name or class, a system, or the path of an SSP or FMU"
         raise UsageError(f"{subject!r} cannot be run: {right}")

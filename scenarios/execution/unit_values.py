@@ -72,7 +72,7 @@ def _set(start: dict[str, Any], port: FmuPort, k: int | None, text: str) -> None
     """Set a port's start value from its text, or with a number the entry of that place only.
 
     Raises:
-        ValueError: it is no value of the port.
+        ValueError: it is not a value of the port.
     """
     if port.kind in (Kind.STRING, Kind.BINARY):
         start[port.name] = text if port.kind is Kind.STRING else bytes.fromhex(text)
@@ -157,7 +157,7 @@ def _values_of_file(settable: SettableParameters, given: Sequence[str]) -> dict[
 def canonical_text(port: FmuPort, text: str) -> str:
     """Return the one text for all texts of a value of a file's parameter: `1`, `1.0` and `+1` are the same number.
 
-    What is no value of the parameter stays as it is.
+    What is not a value of the parameter stays as it is.
     """
     try:
         if port.kind is Kind.REAL:

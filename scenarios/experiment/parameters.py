@@ -14,7 +14,7 @@ from handover.scenarios.experiment.experiment import Experiment
 
 
 class UnknownParameter(str):
-    """The fault of a name that is no parameter's, with the nearest of theirs; `name` is the name."""
+    """The fault of a name that is not a parameter's, with the nearest of theirs; `name` is the name."""
 
     name: str
 

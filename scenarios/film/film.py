@@ -48,7 +48,7 @@ def frame_times(begin: float, end: float, settings: FilmSettings) -> Floats:
     if not steps <= _MOST_FRAMES:
         faster = f"{(end - begin) * settings.fps / _MOST_FRAMES:.2g}"
         raise NotFilmed(
-            f"{steps:.3g} frames are too many, at most {_MOST_FRAMES} are right: --pace {faster}, or faster"
+            f"{steps:.3g} frames are too many, at most {_MOST_FRAMES} are possible: --pace {faster}, or faster"
         )
     whole = int(steps * (1.0 + 1e-9))
     times: Floats = begin + np.arange(whole + 1, dtype=np.float64) * (settings.pace / settings.fps)

@@ -131,7 +131,7 @@ def _chosen(own: Sequence[TimePlot], record: Record, names: Sequence[str]) -> li
 
 
 def _why_not(own: Sequence[TimePlot], record: Record, name: str) -> str:
-    """Return why a name is of no plot, and which names are right."""
+    """Return why a name is of no plot, and which names there are."""
     signal = name if name in record.signals else name.rpartition("[")[0]
     if signal not in record.signals:
         return f"no plot or signal of that name; {nearest(name, [*(plot.title for plot in own), *record.signals])}"
@@ -188,7 +188,7 @@ def film_html(content: FilmContent, size: tuple[int, int], view: str) -> str:
     """
     replay, record = content.replay, content.record
     if view == "follow" and replay is not None and not replay.follow:
-        raise NotFilmed(f"--view follow: this scene has nothing to follow; {', '.join(VIEWS[:-1])} are right")
+        raise NotFilmed(f"--view follow: this scene has nothing to follow; expected {', '.join(VIEWS[:-1])}")
     data: dict[str, Any] = {"scene": None, "view": view, "phases": []}
     legend = Markup()
     if replay is not None and content.scene is not None:

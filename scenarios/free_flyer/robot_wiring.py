@@ -133,7 +133,7 @@ def undriven_joints(system: System) -> list[str]:
         if "q_J" in unit.description.inputs and "q_J" not in system.fed_inputs(name)
     ]
     return jointless + [
-        f"{name}.joints: nothing drives an arm's joints here; {name}.joints=0 is right, or {name}.tolerance_J=0, which "
+        f"{name}.joints: nothing drives an arm's joints here; expected {name}.joints=0, or {name}.tolerance_J=0, which "
         "fixes them; the controller of flyer_arm_impedance drives joints"
         for name, unit in system.units.items()
         if unit.description.name == _ROBOT

@@ -68,7 +68,7 @@ class IrGrasp(Experiment[GraspEvaluator]):
     and what vision takes them for, a shift and a turn of any size, an object that is carried or bumped, a second one
     beside it. What disturbs sensors and encoders are parameters of the scene, as in `-p scene.sensor_tolerance=0.1`.
     None of it changes anything by default. How far the object was pushed is counted from the ground below it, so what
-    that carried is no push.
+    that carried is not a push.
     """
 
     name: ClassVar[str] = "ir_grasp"

@@ -56,7 +56,7 @@ PLACES = {
             "yaw_H_0": "drawn from the run's seed",
         },
         optional={
-            "p_ground": "what it carried the object is no displacement by the hand",
+            "p_ground": "what it carried the object is not a displacement by the hand",
             "tension": "shown as a signal",
             "q_meas": "felt by strategy=contact and correction=fast",
             "tension_meas": "felt by strategy=contact and correction=fast",

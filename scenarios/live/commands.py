@@ -42,7 +42,7 @@ _FAR = 5.0
 
 
 class InvalidCommand(ValueError):
-    """What came over a connection is no command of the page."""
+    """What came over a connection is not a command of the page."""
 
 
 _PACE: Any = Annotated[float, Meta(ge=0.0, le=_HIGHEST_PACE)]
@@ -91,7 +91,7 @@ def parse_command(text: str, longest: int = LONGEST) -> Command:
     try:
         members = decoded(text, _Members)
     except InvalidData as e:
-        raise InvalidCommand(f'{{"command": NAME, "value": VALUE}} is right: {e}') from e
+        raise InvalidCommand(f'expected {{"command": NAME, "value": VALUE}}: {e}') from e
     return Command(members.command, members.value)
 
 

@@ -81,7 +81,7 @@ def is_same_origin(socket: WebSocket, *, browsers_only: bool = True) -> bool:
 
     Args:
         socket: the connection.
-        browsers_only: whether one without an Origin is refused; a tracker that is no browser gives none.
+        browsers_only: whether one without an Origin is refused; a tracker that is not a browser gives none.
     """
     origin = socket.headers.get("origin")
     if origin is None:

@@ -51,7 +51,7 @@ _WINDOW = 600
 
 
 class InvalidHandMessage(ValueError):
-    """What came is no sample of a hand, or not one that may be used."""
+    """What came is not a sample of a hand, or not one that may be used."""
 
 
 _Joint = Annotated[float, Meta(ge=-_ROUNDING, le=JOINT_MAX + _ROUNDING)]
@@ -131,11 +131,11 @@ def hand_sample(content: Any) -> HandSample:
     try:
         sent = checked(content, _SentSample)
     except InvalidData as e:
-        raise InvalidHandMessage(f"an object with p_WH, q_WH, closed or angles, and stamp is right: {e}") from e
+        raise InvalidHandMessage(f"expected an object with p_WH, q_WH, closed or angles, and stamp: {e}") from e
     faults = list[str]()
     norm = math.hypot(*sent.q_WH)
     if abs(norm - 1.0) > _UNIT:
-        faults.append(f"q_WH: a quaternion of norm 1 is right, not {norm:.3g}")
+        faults.append(f"q_WH: expected a quaternion of norm 1, not {norm:.3g}")
     if sent.sent is not None and sent.sent < sent.stamp:
         faults.append(f"sent: {sent.sent:.6g} s is before stamp, {sent.stamp:.6g} s")
     if sent.closed is None and sent.angles is None:

@@ -182,7 +182,7 @@ def _start_text(value: Any) -> str:
 
 
 def faults_by_name(request: RunRequest, names: Sequence[str]) -> dict[str, str]:
-    """Return what is wrong with what is to be run, by the parameter's name; under "" what is no parameter's.
+    """Return what is wrong with what is to be run, by the parameter's name; under "" what is not a parameter's.
 
     Args:
         request: says what is to be run.

@@ -64,7 +64,7 @@ class WebcamFiles:
             InvalidWebcamFiles: one is missing, cannot be read, or is not what its name says.
         """
         if not folder.is_dir():
-            raise InvalidWebcamFiles(f"{folder} is no folder; {_RIGHT}")
+            raise InvalidWebcamFiles(f"{folder} is not a folder; {_RIGHT}")
         contents, faults = dict[str, bytes](), list[str]()
         for name, fault_of in FILES.items():
             try:
@@ -114,7 +114,7 @@ def _served(name: str, content: bytes) -> Callable[[Request], Response]:
 def _fault_of_bundle(content: bytes) -> str:
     if b"HandLandmarker" in content and b"export" in content:
         return ""
-    return "is no module that exports HandLandmarker"
+    return "is not a module that exports HandLandmarker"
 
 
 def _fault_of_loader(content: bytes) -> str:
@@ -122,7 +122,7 @@ def _fault_of_loader(content: bytes) -> str:
 
 
 def _fault_of_wasm(content: bytes) -> str:
-    return "" if content.startswith(b"\0asm") else "is no WebAssembly, which begins with \\0asm"
+    return "" if content.startswith(b"\0asm") else "is not a WebAssembly, which begins with \\0asm"
 
 
 def _fault_of_model(content: bytes) -> str:
@@ -134,7 +134,7 @@ def _fault_of_model(content: bytes) -> str:
                 return f"has a part of more than {_LARGEST // 10**6} MB: {large[0]}"
             parts = {part.filename: bundle.read(part)[4:8] for part in there}
     except _DAMAGES as e:
-        return f"is no bundle of models, a zip file: {e}"
+        return f"is not a bundle of models, a zip file: {e}"
     wrong = [name for name in MODEL_PARTS if parts.get(name) != b"TFL3"]
     return f"has no TensorFlow Lite model {' and '.join(wrong)}" if wrong else ""
 

@@ -124,7 +124,7 @@ def _explorer(record: Record | None, faults: ToleratedFaults) -> Section | None:
 def _sections_of_units(facts: RunFacts) -> Sequence[Section | None]:
     try:
         return graph_section(facts.run), cpu_section(facts.summary)
-    except (KeyError, ValueError) as e:  # an icon that is no picture, or a connection of a unit that is not listed
+    except (KeyError, ValueError) as e:  # an icon that is not a picture, or a connection of a unit that is not listed
         fault = f"its description of the units is damaged: {type(e).__name__} {e}"
         raise InvalidRunFolder(facts.folder.path, fault) from e
 

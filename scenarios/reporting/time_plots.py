@@ -55,7 +55,7 @@ def rows_of_steps(values: Floats, max_rows: int) -> Rows:
 
 
 def changes_of(values: Floats) -> Rows:
-    """Return the rows whose value differs from the one before; NaN after NaN is no change."""
+    """Return the rows whose value differs from the one before; NaN after NaN is not a change."""
     before, after = values[:-1], values[1:]
     return np.flatnonzero((before != after) & ~(np.isnan(before) & np.isnan(after))) + 1
 

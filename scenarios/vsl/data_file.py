@@ -90,7 +90,7 @@ def read_data(path: Path, kinematics: VslKinematics, parameters: Mapping[str, An
     except OSError as e:
         raise InvalidData(path, reading_fault(e)) from e
     except InvalidRecord as e:
-        raise InvalidData(path, f"it is no Parquet file that can be read: {e.fault}") from e
+        raise InvalidData(path, f"it is not a Parquet file that can be read: {e.fault}") from e
     wanted = [*(f"{port}[{k + 1}]" for port, n in _COLUMNS.values() for k in range(n)), _ORDER]
     if missing := [name for name in wanted if name not in table.column_names]:
         raise InvalidData(path, f"it lacks the columns {', '.join(missing)}")

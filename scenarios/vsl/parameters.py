@@ -248,7 +248,7 @@ class Parameters:
         """Return the segments of the path.
 
         Raises:
-            InvalidWaypoints: there is no file of that name, or it is no list of waypoints.
+            InvalidWaypoints: there is no file of that name, or it is not a list of waypoints.
         """
         return segments_by(self.path, self.x_0, self.x_g, self.waypoints)
 

@@ -128,7 +128,7 @@ class PathExperiment(Experiment[PathEvaluator]):
         """Return the nominal duration of the run, settling and path, plus a grace period.
 
         Raises:
-            InvalidParameter: there is no such file of waypoints, or it is no list of them.
+            InvalidParameter: there is no such file of waypoints, or it is not a list of them.
         """
         try:
             length = parameters.length

@@ -70,7 +70,7 @@ def test_what_cannot_be_read_is_not_judged_and_the_rest_is(fmi: int):
     with Master(alone("keeps_in_secret", fmi, **START)) as master:
         assert float(master.signals["unit.y"]) == 7.0 * 5.0 + 11
         assert list(master.ensemble.instances["unit"].log) == []
-        master.run(Fraction(1, 2))  # that it refused to be read is no failure
+        master.run(Fraction(1, 2))  # that it refused to be read is not a failure
     with Master(alone("resets_in_secret", fmi, **START)) as master:
         instance = master.ensemble.instances["unit"]
         (u,) = instance.read([instance.description.inputs["u"]])

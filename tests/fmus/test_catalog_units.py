@@ -61,7 +61,7 @@ def test_a_unit_lists_the_package_that_it_stands_on():
 
 
 def test_a_simulation_by_default_ends_with_a_whole_step():
-    """Of 15 ms, of which 1 s, where FMPy would stop by itself, is no multiple."""
+    """Of 15 ms, of which 1 s, where FMPy would stop by itself, is not a multiple."""
     assert fmpy.simulate_fmu(str(cached("IrReflex", 3)))["time"] == pytest.approx(np.arange(68) * 0.015)
 
 

@@ -21,7 +21,7 @@ def with_path() -> dict[str, str]:
 
 
 def lives(process: int) -> bool:
-    """Return whether a process exists and is no zombie."""
+    """Return whether a process exists and is not a zombie."""
     with contextlib.suppress(ProcessLookupError, FileNotFoundError):
         return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     return False

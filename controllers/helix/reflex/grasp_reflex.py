@@ -43,7 +43,7 @@ class InvalidGraspReflexParameters(InvalidParameters):
 
 
 class InvalidReading(InvalidParameters):
-    """An input that is no number; `faults` names all of them."""
+    """An input that is not a number; `faults` names all of them."""
 
     block = "GraspReflex"
 
@@ -477,7 +477,7 @@ class GraspReflex:
 
 
 def _check_inputs(u: Inputs) -> None:
-    """Raise InvalidReading for what is no number: it would stay in the filter for ever."""
+    """Raise InvalidReading for what is not a number: it would stay in the filter for ever."""
     inputs = {"ticks": u.ticks, "grip": u.grip, "dl_t": u.dl_t, "q_est": u.q_est}
     inputs |= {"p_WO_meas": u.p_WO_meas, "cov_O": u.cov_O} if u.seen_O else {}
     inputs |= {"p_WR_meas": u.p_WR_meas, "p_WG_meas": u.p_WG_meas, "cov_G": u.cov_G} if u.seen_R else {}

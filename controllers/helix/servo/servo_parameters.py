@@ -307,7 +307,7 @@ class Params:
         0.001,
         "change of the error that is progress (own choice)",
         minimum=0.0,
-        origin=assumed("own choice: what a hand trembles is no progress"),
+        origin=assumed("own choice: what a hand trembles is not progress"),
     )
     max_steps: int = parameter(
         1000,
@@ -352,7 +352,7 @@ class Params:
     )
     ball_motion: Metre = parameter(
         0.0006,
-        "standard deviation, along an axis, of a ball's tremor, which is no motion to follow (own choice)",
+        "standard deviation, along an axis, of a ball's tremor, which is not motion to follow (own choice)",
         minimum=0.0,
         origin=derived("tremor_rms / sqrt(3), of the plant's hand: as if the controller knew how a hand trembles"),
     )

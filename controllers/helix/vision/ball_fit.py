@@ -20,7 +20,7 @@ _CAPTURED = 1.0  # px; step of the outline after which it is known roughly
 _SETTLED, _SETTLED_ALONE = 0.2, 0.1  # px; likewise well enough: a tenth of it is 2 mm where size alone tells depth
 _ROUGHLY, _EXACTLY = (5.0, 2.5), (1.0, 0.4)  # px; tolerances of the first and the second solution of a pass
 _STRIDE = 0.02  # m; standard deviation that is expected of a step: it holds what few edges leave free
-_MIN_WEIGHT = 4.0  # sum of the edges' weights; less is no ball
+_MIN_WEIGHT = 4.0  # sum of the edges' weights; less is not a ball
 _STILL_THERE = 4.0  # px; the fit finds edges within 7 px
 _MAX_SHIFT = 2.0  # px; an edge that is farther off is that of something larger or smaller
 

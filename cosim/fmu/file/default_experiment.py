@@ -21,7 +21,7 @@ _PARTS = 500
 """Steps of a default experiment whose length is not given."""
 
 NO_STEP = "its FMU proposes no communication step"
-INVALID_STEP = f"is no communication step; a number from {SHORTEST_STEP:g} s on is right"
+INVALID_STEP = f"is not a communication step; expected a number from {SHORTEST_STEP:g} s on"
 """What is wrong with a text that should be a step."""
 
 
@@ -89,7 +89,7 @@ def proposed_step(step: float | None) -> Fraction | None:
 
 
 def presumed_step(duration: float | Fraction) -> Fraction | None:
-    """Return a 500th of a duration in seconds, to one significant digit; None where that is no step."""
+    """Return a 500th of a duration in seconds, to one significant digit; None where that is not a step."""
     if duration > sys.float_info.max:
         return None
     step = Fraction(f"{float(duration) / _PARTS:.0e}")

@@ -64,7 +64,7 @@ class DescribedVariable:
             return _real(text)
         if self.type == "Boolean":
             if text not in ("true", "false", "1", "0"):
-                raise ValueError(f"{text!r} is not a boolean: true, false, 1 or 0 is right")
+                raise ValueError(f"{text!r} is not a boolean: expected true, false, 1 or 0")
             return int(text in ("true", "1"))
         if self.type in _SIGNED or self.type in _UNSIGNED:
             return _integer(text, self.type)
@@ -72,7 +72,7 @@ class DescribedVariable:
             try:
                 return bytes.fromhex(text).hex()
             except ValueError:
-                raise ValueError(f"{text[:40]!r} is not binary: pairs of hexadecimal digits are right") from None
+                raise ValueError(f"{text[:40]!r} is not binary: expected pairs of hexadecimal digits") from None
         return text
 
     def shape(self, starts_of: Mapping[str, str]) -> tuple[int, ...] | None:
@@ -104,7 +104,7 @@ def _real(text: str) -> float:
             raise ValueError
         return float(text)
     except ValueError:
-        raise ValueError(f"{text[:40]!r} is not a number: such as 0.5 or 1e-3 is right") from None
+        raise ValueError(f"{text[:40]!r} is not a number, such as 0.5 or 1e-3") from None
 
 
 def _integer(text: str, fmi_type: str) -> int:
@@ -115,5 +115,5 @@ def _integer(text: str, fmi_type: str) -> int:
     if not (digits.isascii() and digits.isdecimal() and len(digits) < 40):
         raise ValueError(f"{text[:40]!r} is not a whole number")
     if not low <= int(text) <= high:
-        raise ValueError(f"{text[:40]} does not fit {fmi_type}: from {low} to {high} is right")
+        raise ValueError(f"{text[:40]} does not fit {fmi_type}: expected from {low} to {high}")
     return int(text)

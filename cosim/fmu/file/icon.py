@@ -1,7 +1,7 @@
 """The icon in an FMU, by which tools show it: where FMI 2 and FMI 3 have it, written and read.
 
 FMI 2 has a PNG, `model.png`, FMI 3 a PNG and, where there is a drawing, an SVG in `terminalsAndIcons/`. An FMU may have
-the files of both. What is there and is no picture is passed over: an icon keeps no unit from running.
+the files of both. What is there and is not a picture is passed over: an icon keeps no unit from running.
 """
 
 from collections.abc import Mapping
@@ -36,7 +36,7 @@ class Icon:
 def png_fault(content: bytes) -> str:
     """Return why bytes are no PNG; empty if they begin as one and its end is there."""
     if not content.startswith(_PNG):
-        return "that is no PNG"
+        return "that is not a PNG"
     return "" if _PNG_END in content else "that is a PNG which is cut off"
 
 

@@ -12,7 +12,7 @@ _MACH = {0x7: "x86", 0x1000007: "x86_64", 0x100000C: "aarch64"}
 
 
 def platforms_of(head: bytes) -> tuple[str, ...]:
-    """Return the platforms of a library by FMI 3.0's names, such as `x86_64-linux`; none if it is no library."""
+    """Return the platforms of a library by FMI 3.0's names, such as `x86_64-linux`; none if it is not a library."""
     try:
         if head.startswith(b"\x7fELF"):
             order = "<" if head[5] == 1 else ">"

@@ -156,7 +156,7 @@ def _without_rules_for_others(variable: Any, values: Sequence[Any]) -> None:
     """Leave out what a variable says of when it has which value, where co-simulation goes by its causality alone.
 
     Parameters are set once, before the start, and outputs are read. A variable that is said to vary continuously, but
-    is no real, changes at events. `values` are the elements that hold the values' attributes.
+    is not a real, changes at events. `values` are the elements that hold the values' attributes.
     """
     causality = variable.get("causality")
     variable.attrib.pop("initial", None)

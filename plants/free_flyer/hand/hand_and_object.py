@@ -78,7 +78,7 @@ class HandAndObject:
     - `FlyerPerson` moves the hand's course and decides when the fingers close; it pulls and pushes by an effort against
       the force on the hand (`Effort`). `HandTremor` is added to the course. A fist pushes the palm by the arm's spring.
     - `HandFingers`: 14 joints whose phalanges, capsules, stop at the object, and push it by springs where they cannot
-      give way; so does the gripper (`GripperSolids`), if the hand is no fist. They have no friction: what holds an
+      give way; so does the gripper (`GripperSolids`), if the hand is not a fist. They have no friction: what holds an
       object is the hand's grip as a whole. A person who closes the hand ends at the touch, without pressing.
     - In place of that person, `driven_by` a track (`HandTrack`, a file) or the inputs of a hand tracker lead the hand
       (`HandGuide`) and its joints, which then press what they close on. It takes hold when it is to grasp and thumb and

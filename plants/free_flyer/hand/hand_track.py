@@ -89,7 +89,7 @@ def read_track(path: Path, max_gap: float) -> HandTrack:
 
     Raises:
         InvalidTrack: it cannot be read, lacks columns or names one twice, or rows are not numbers, before 0 s, not in
-            the order of time, too far apart, or hold a quaternion that is no rotation or a joint beyond 0 to 90
+            the order of time, too far apart, or hold a quaternion that is not a rotation or a joint beyond 0 to 90
             degrees.
     """
     try:

@@ -47,7 +47,7 @@ class NoOrientation(ValueError):
     """The truth has an orientation that is none: its quaternion is zero."""
 
     def __init__(self, t: float) -> None:
-        super().__init__(f"input q_WB is [0, 0, 0, 0] at {t:g} s, which is no orientation: give a unit quaternion")
+        super().__init__(f"input q_WB is [0, 0, 0, 0] at {t:g} s, which is not an orientation: give a unit quaternion")
         self.t = t
 
 

@@ -128,7 +128,7 @@ class Params:
         """Raise InvalidThrusterParameters if limits, or stuck nozzles, leave no thrust at all in a direction."""
         given = (("f_max", "force along", self.f_max), ("tau_max", "torque about", self.tau_max))
         faults = [
-            f"{name}: there is no {what} {', '.join(axes)}; a value above 0, or propulsion IDEAL, is right"
+            f"{name}: there is no {what} {', '.join(axes)}; expected a value above 0, or propulsion IDEAL"
             for name, what, most in given
             if self.propulsion is not Propulsion.IDEAL
             and (axes := [axis for axis, x in zip("xyz", np.asarray(most).tolist(), strict=True) if x == 0.0])
@@ -183,7 +183,7 @@ class Thrusters:
     The command is constant in a step, so thrust and its integral are exact: over d seconds of command c,
     y <- c + (y - c) e^(-d/T) and its integral is c d + (y - c) T (1 - e^(-d/T)). The outputs are the mean over the
     step that ends, so that the robot gets the whole impulse; in a system the thrusters come before the robot, which
-    then uses the mean in the same step. Where a delay is no multiple of the step, two commands share it.
+    then uses the mean in the same step. Where a delay is not a multiple of the step, two commands share it.
 
     With nozzles the clipped command is shared among twelve, and scaled down where they do not have it (`Nozzles`); it
     is their thrusts that are delayed, and flappers and impellers that lag (`PropulsionModules`). Axes are clipped first

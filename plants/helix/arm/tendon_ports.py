@@ -15,14 +15,14 @@ _POINTS = 25
 
 
 class StepSizeError(ValueError):
-    """A step is no multiple of the internal time step; nothing has changed."""
+    """A step is not a multiple of the internal time step; nothing has changed."""
 
     is_refusal = True
 
     def __init__(self, dt: float, internal_step: float, block: str) -> None:
         steps = max(int(dt / internal_step), 1)
         super().__init__(
-            f"{block}: a step of {dt:.6g} s is no multiple of the internal step {internal_step:g} s; "
+            f"{block}: a step of {dt:.6g} s is not a multiple of the internal step {internal_step:g} s; "
             f"{steps * internal_step:.6g} s or {(steps + 1) * internal_step:.6g} s would fit"
         )
         self.dt, self.internal_step = dt, internal_step
@@ -77,7 +77,7 @@ def internal_steps(dt: float, internal_step: float, block: str) -> int:
     """Return how many internal steps a step dt takes, both in s.
 
     Raises:
-        StepSizeError: it is no multiple of them.
+        StepSizeError: it is not a multiple of them.
     """
     steps = round(dt / internal_step)
     if steps < 1 or abs(steps * internal_step - dt) > 1e-6 * internal_step:

@@ -185,7 +185,7 @@ def _opened(folder: Path) -> "Generator[StudyFolder, None, None]":
     from handover.scenarios.study.folder.study_folder import StudyFolder
 
     if not folder.is_dir():
-        raise UsageError(f"{folder} is no folder; name that of a study")
+        raise UsageError(f"{folder} is not a folder; name that of a study")
     yield StudyFolder.read(folder)
 
 

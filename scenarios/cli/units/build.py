@@ -44,7 +44,7 @@ def load_user_block(path: str, step: str | None) -> Entry:
     Its step is that which is given, a number or a fraction of seconds, else the block's period, else 0.01 s.
 
     Raises:
-        UsageError: there is no such class, its module cannot be loaded, it is no block, or the step is invalid.
+        UsageError: there is no such class, its module cannot be loaded, it is not a block, or the step is invalid.
     """
     search_folder(Path.cwd())
     given = None if step is None else _seconds(step)

@@ -47,9 +47,7 @@ def info(file: Path, *, as_json: bool) -> None:
             raise UsageError(f"{file}: {nothing_at(file)}")
         if file.is_dir():
             raise UsageError(f"{file}: {folder_fault(file)}")
-        right = (
-            "a file that ends with .fmu, .ssp or .ssd, or its unpacked folder, is right; of units and scenarios, see"
-        )
+        right = "expected a file that ends with .fmu, .ssp or .ssd, or its unpacked folder; of units and scenarios, see"
         right += " `handover list`"
         raise UsageError(f"{file}: {right}")
     with one_line_errors():

@@ -82,7 +82,7 @@ def _names(name: str) -> tuple[str, str]:
         UsageError: they would be no names in Python, or taken.
     """
     if not _NAME.fullmatch(name) or name.endswith("_"):
-        raise UsageError(f"{name!r} is no name: letters, digits and underscores are right, such as TwoLinkArm")
+        raise UsageError(f"{name!r} is not a name: expected letters, digits and underscores, such as TwoLinkArm")
     if len(name) > _LONGEST:
         raise UsageError(f"{name[:30]}...: {len(name)} letters; at most {_LONGEST} are right for names of files")
     module = re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", name).lower()

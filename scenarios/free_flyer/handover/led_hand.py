@@ -83,7 +83,7 @@ def _faults(track: HandTrack, stop: float) -> list[str]:
     """Return why no handover can be made of a track."""
     faults: list[str] = []
     if len(track.times) == 1:
-        faults.append("it has one row, and a hand that neither comes nor pulls; a row each 0.2 s or less is right")
+        faults.append("it has one row, and a hand that neither comes nor pulls; expected a row each 0.2 s or less")
     if track.times[0] >= stop:
         faults.append(f"it begins at {track.times[0]:g} s, and the run ends by {stop:g} s: let its times begin at 0 s")
     person = vars(Params())

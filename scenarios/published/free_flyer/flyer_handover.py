@@ -214,7 +214,7 @@ class FlyerHandoverTable(PublishedExperiment):
 class HandoverRuns:
     """Runs of the campaign by what they are for, those that did not come to their end as well.
 
-    Such a run has no metrics and is no success: whatever counts successes counts it as a failure.
+    Such a run has no metrics and is not a success: whatever counts successes counts it as a failure.
     """
 
     def __init__(self, table: CampaignTable) -> None:

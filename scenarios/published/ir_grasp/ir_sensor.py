@@ -48,8 +48,8 @@ _EVERY = 7
 """One of so many readings is drawn."""
 
 _BY_CONSTRUCTION = (
-    "The sensors of the scene have a curve of this form by construction, so agreement is no evidence. The paper prints "
-    "no coefficients."
+    "The sensors of the scene have a curve of this form by construction, so agreement is not evidence. The paper "
+    "prints no coefficients."
 )
 _PUT_IN = (
     "How far sensors differ is put in, as the paper gives no figures. By that part: the largest deviation of any "

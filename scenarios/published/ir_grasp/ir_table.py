@@ -95,10 +95,10 @@ _MIN_RUNS = 10
 
 _BLIND_SELECTED = (
     "How far the hand is before it closes and objects were moved was chosen so that the blind hand fails about as in "
-    "table I, so agreement is no evidence."
+    "table I, so agreement is not evidence."
 )
 _FAILURE_SELECTED = (
-    "The blind hand fails by choice of gap and shift, and to do better is no evidence that sensing is needed: "
+    "The blind hand fails by choice of gap and shift, and to do better is not evidence that sensing is needed: "
     "`handover paper ir-limits` asks where it is."
 )
 _EASIER = (

@@ -29,7 +29,7 @@ class Column:
     Attributes:
         name: in the table's head.
         kind: its type.
-        unit: "1" of numbers without one, "" of what is no number.
+        unit: "1" of numbers without one, "" of what is not a number.
         meaning: in a sentence without its full stop.
         optional: whether it may be empty.
         free: whether it is text that a person typed.

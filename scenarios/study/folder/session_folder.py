@@ -264,7 +264,7 @@ class SessionFolder:
         low, high = self.plan.scale
         for name, value in answers.items():
             if isinstance(value, bool) or value not in self.plan.ratings:
-                faults.append(f"{name} = {value!r}: a whole number from {low} to {high} is right")
+                faults.append(f"{name} = {value!r}: expected a whole number from {low} to {high}")
         if faults or kept is None:
             raise ValueError("; ".join(faults))
         self._keep(number, asdict(kept.record), {name: int(answers[name]) for name in self.plan.statements})
@@ -280,7 +280,7 @@ class SessionFolder:
         for name, question in questions.items():
             answer = answers.get(name, "")
             if answer and question.choices and answer not in question.choices:
-                faults.append(f"{name} = {answer!r}: {', '.join(question.choices)} are right")
+                faults.append(f"{name} = {answer!r}: expected {', '.join(question.choices)}")
         if faults:
             raise ValueError("; ".join(faults))
         kept = {name: str(answers[name]) for name in questions if answers.get(name)}

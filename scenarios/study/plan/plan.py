@@ -278,7 +278,7 @@ def _faults(plan: _Plan) -> Iterator[str]:
         if name not in DEVICES:
             yield f"devices: no device {name!r}; {nearest(name, DEVICES)}"
     if SCRIPT in plan.devices and not plan.pilot:
-        yield "devices: 'script' is no person's; pilot = true is of scripted pilots"
+        yield "devices: 'script' is not a person's; pilot = true is of scripted pilots"
     if plan.scale.highest <= plan.scale.lowest:
         yield f"scale: its highest, {plan.scale.highest}, is not above its lowest, {plan.scale.lowest}"
     questions = [q.name for q in plan.questions]

@@ -27,7 +27,7 @@ def parse_message(text: str) -> tuple[str, Any]:
     try:
         members = decoded(text, dict[str, Any])
     except InvalidData as e:
-        raise InvalidAction(f"an object is right: {e}") from e
+        raise InvalidAction(f"expected an object: {e}") from e
     if len(members) != 1 or not members.keys() <= _MESSAGES:
         raise InvalidAction(f"it is not an object with one of {', '.join(sorted(_MESSAGES))}")
     return next(iter(members.items()))

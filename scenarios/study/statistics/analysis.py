@@ -269,7 +269,7 @@ class StudyAnalysis:
         """How ratings and failures go with the round's number, the period, and the behaviour of the round before.
 
         Of complete sessions, without their void rounds and the first, which comes after nothing. The number, or the
-        period, and carry-over are fitted together: void rounds, and a number of sessions that is no multiple of the
+        period, and carry-over are fitted together: void rounds, and a number of sessions that is not a multiple of the
         conditions, would leave the one in the other's slope.
         """
         measured = {name: [a for a in self._rated if a["statement"] == name] for name in self.plan.statements}

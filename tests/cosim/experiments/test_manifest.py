@@ -62,7 +62,7 @@ def test_a_step_that_would_take_long_is_refused_before_it_is_made_exact(
     content = manifest(STIMULUS.format(SETUP.format("1", "").replace("1/10", step)))
     level, line = manifest_findings(packed(tmp_path, content, {"in.csv": INPUTS}))[0]
     assert level is Level.FAULT
-    assert f"step='{step[:40]}' is no positive number of seconds" in line
+    assert f"step='{step[:40]}' is not a positive number of seconds" in line
 
 
 def test_a_path_that_leads_to_another_folder_of_the_archive_is_right(tmp_path: Path):

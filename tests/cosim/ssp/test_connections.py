@@ -212,7 +212,7 @@ def test_start_and_stop_time_are_the_default_experiment_s(opened: Open, wording:
     ):
         ssp = opened(TWO, more=experiment(start, stop))
         assert [str(ssp.system.start), str(ssp.stop)] == wanted
-    assert opened(TWO, more=experiment("-1e308", "1e308")).stop == 1e308  # what lies between is no double
+    assert opened(TWO, more=experiment("-1e308", "1e308")).stop == 1e308  # what lies between is not a double
     for start, stop in (("2", "2"), ("0", "-1")):
         wording.check(refusal(opened, TWO, more=experiment(start, stop)))
 

@@ -153,8 +153,8 @@ def test_an_integer_goes_to_an_enumeration(edited: Edited, compiled: bool):
     source = s.add("source", native_fmu("discrete_passer", 2), count_in=5)
     target = s.add("target", edited("discrete_passer", 2, item, counted))
     s.connect(source.y.count, target.u.count_in)
-    assert ["an integer is no enumeration" in line for line in s.tolerated] == [True]
-    with pytest.raises(WiringError, match="an integer is no enumeration"):
+    assert ["an integer is not an enumeration" in line for line in s.tolerated] == [True]
+    with pytest.raises(WiringError, match="an integer is not an enumeration"):
         Master(s, MasterOptions(strict=True))
     assert last_row(s, "target.count", MasterOptions(compiled=compiled)) == 5
 

@@ -154,7 +154,7 @@ def test_a_port_whose_name_is_no_identifier_is_named_by_key(edited: Edited):
     assert first.y["der(x) / a b"] == PortName("first", "der(x) / a b")
     assert second.u["f"] == second.u.f
     system.connect(first.y["der(x) / a b"], second.u.f)
-    assert any("first.der(x) / a b (real m)" in fault for fault in faults_of(system))  # m is no N
+    assert any("first.der(x) / a b (real m)" in fault for fault in faults_of(system))  # m is not a N
 
 
 def test_clocks_that_do_not_fit_are_reported(wording: Wording):

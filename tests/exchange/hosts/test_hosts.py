@@ -42,7 +42,7 @@ def faults_of(text: str) -> list[str]:
             rows = {line.split("`")[1]: line.count("|") - 2 for line in lines if line.startswith("| `")}
             if f"| unit | {' | '.join(HOSTS)} |" not in lines:
                 faults.append(f"{form}: other hosts than {', '.join(HOSTS)}")
-            faults += [f"{form}: {unit} is no unit of the catalog" for unit in rows if unit not in UNITS]
+            faults += [f"{form}: {unit} is not a unit of the catalog" for unit in rows if unit not in UNITS]
             faults += [f"{form}: {unit} has {n} cells" for unit, n in rows.items() if n != len(HOSTS)]
             seen.append(set(rows))
     return faults + [

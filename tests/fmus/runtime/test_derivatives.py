@@ -83,7 +83,7 @@ def test_what_is_no_real_input_or_output_or_of_another_size_is_refused(workshop:
     ]:
         expect_error(wording, host, derivative(host, seed, knowns=knowns, unknowns=unknowns)[0])
     assert derivative(host, [666.0] + [0.0] * 6)[0] == ERROR
-    wording.check(host.log[-1].splitlines()[-1])  # of what is no output
+    wording.check(host.log[-1].splitlines()[-1])  # of what is not an output
     if fmi == 3:
         expect_error(wording, host, derivative(host, [1.0] * 6)[0])
         k, u = references(host, INPUTS), references(host, OUTPUTS)

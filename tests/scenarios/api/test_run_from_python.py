@@ -97,7 +97,7 @@ def test_an_fmu_is_run_by_itself(tmp_path: Path):
 
 @pytest.mark.parametrize("subject", ["ir_grasp", native_fmu("gain")])
 def test_a_keyword_that_is_like_an_argument_is_taken_for_one(subject: str | Path):
-    with pytest.raises(handover.InvalidInput, match="if 'sead' is meant as an argument, seed is right") as raised:
+    with pytest.raises(handover.InvalidInput, match="as an argument, 'sead' is spelt seed") as raised:
         handover.run(subject, sead=1)
     assert isinstance(raised.value.__cause__, InvalidParameter)
     assert raised.value.__cause__.unknown == ("sead",)
@@ -223,5 +223,5 @@ def test_what_cannot_be_run_is_told_in_one_sentence_and_nothing_is_written(
 def test_a_file_in_a_run_s_folder_is_told_to_be_one(tmp_path: Path):
     file = tmp_path / "run.json"
     file.write_text("{}")
-    with pytest.raises(handover.InvalidInput, match="it is a file; the folder"):
+    with pytest.raises(handover.InvalidInput, match="it is a file; expected the folder"):
         handover.load(file)

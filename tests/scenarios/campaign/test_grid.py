@@ -96,5 +96,5 @@ def test_a_parameter_cannot_be_varied_and_set():
         "patience is given twice",
         "helix_handover has no parameter 'alhpa'; did you mean alpha?",
         "'x' is not of the form name=value",
-        "alpha is varied and set by -p; one of both is right",
+        "alpha is varied and set by -p; give one of them",
     ]

@@ -23,7 +23,7 @@ def test_a_folder_that_is_none_is_told_before_an_extra_that_is_missing(tmp_path:
     monkeypatch.setattr("handover.scenarios.cli.resume.require_extra", lacking)
     empty = tmp_path / "empty"
     empty.mkdir()
-    for folder, told in ((tmp_path / "nosuch", "is no folder"), (empty, "it has no run.json")):
+    for folder, told in ((tmp_path / "nosuch", "is not a folder"), (empty, "it has no run.json")):
         assert told in refusal("resume", folder)
 
 

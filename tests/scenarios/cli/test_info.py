@@ -103,7 +103,7 @@ class Misplaced(IrGrasp):
 
 def test_a_place_with_a_port_that_there_is_not_is_told():
     for show in (place_data, print_place):
-        with pytest.raises(UsageError, match="place reflex: 'sigma_cmt' is no port or parameter of IrReflex"):
+        with pytest.raises(UsageError, match="place reflex: 'sigma_cmt' is not a port or parameter of IrReflex"):
             show(Misplaced, "reflex")
 
 

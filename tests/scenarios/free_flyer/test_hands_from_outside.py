@@ -50,7 +50,7 @@ def test_a_hand_that_nothing_leads_takes_nothing_and_no_simulated_person_is_blam
 def test_the_command_says_that_nobody_leads_it(tmp_path: Path):
     given = ["run", "flyer_robot_to_human", "-p", "hand=outside", "--stop", "0.1", "--no-report"]
     done = CliRunner().invoke(main, [*given, "--out", str(tmp_path / "run")])
-    assert "nobody leads the hand" in done.output
+    assert "no hand input" in done.output
 
 
 @pytest.mark.parametrize(

@@ -55,7 +55,7 @@ REFUSED: dict[str, Callable[[], object]] = {
     "no numbers of plots": lambda: plot_numbers("all"),
     "no parameters": lambda: chosen("all"),
     "an unknown parameter": lambda: chosen({"parameters": {"secret": "1"}}),
-    "a parameter that is no text": lambda: chosen({"parameters": {"force": 3}}),
+    "a parameter that is not a text": lambda: chosen({"parameters": {"force": 3}}),
     "a negative seed": lambda: chosen({"parameters": {}, "seed": -1}),
     "another option": lambda: chosen({"parameters": {}, "out": "/tmp"}),
     "a run that is not over": lambda: run_number(7, [1]),

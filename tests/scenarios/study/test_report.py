@@ -198,7 +198,7 @@ def test_a_plan_of_other_tasks_has_a_page_without_the_thesis(tmp_path: Path):
 
 def test_what_is_no_study_is_told(tmp_path: Path):
     for command in ("report", "export"):
-        assert "is no folder" in study(command, tmp_path / "none").output
+        assert "is not a folder" in study(command, tmp_path / "none").output
         refused = study(command, tmp_path)
         assert refused.exit_code == 2
         assert "it is not the folder of a study" in refused.output

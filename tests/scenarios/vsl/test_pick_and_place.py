@@ -90,7 +90,7 @@ def test_no_run_starts_in_the_ground_or_the_object(
     with pytest.raises(InvalidParameter) as refused:
         built_system(scenario(), parse_parameters(scenario, given), 0, fmus, values)
     wording.check(refused.value)
-    built_system(scenario(), parse_parameters(scenario, given), 0, fmus, {})  # an elbow that points down is no fault
+    built_system(scenario(), parse_parameters(scenario, given), 0, fmus, {})  # an elbow that points down is not a fault
 
 
 @pytest.mark.slow

@@ -152,5 +152,5 @@ def test_a_file_that_is_no_parquet_is_refused_and_nothing_overwritten(content: b
     (tmp_path / "m.json").write_text("former")
     result = call("--data", tmp_path / "d.parquet", "--out", tmp_path / "m.json")
     assert result.exit_code == 2
-    assert "it is no Parquet file that can be read" in result.output  # the rest is PyArrow's words
+    assert "it is not a Parquet file that can be read" in result.output  # the rest is PyArrow's words
     assert (tmp_path / "m.json").read_text() == "former"

@@ -19,7 +19,7 @@ class CallLog(Heartbeat):
         super().begin(code, t)
         under_way = self.under_way
         assert under_way is not None
-        if under_way.call != UNLOADING:  # which is no call of the unit's
+        if under_way.call != UNLOADING:  # which is not a call of the unit's
             self.calls.append(under_way[:2])
 
     def after(self, unit: str, call: str, last: str) -> list[str]:

@@ -48,7 +48,7 @@ def derive(s: Subject, rng: random.Random) -> None:
 
 
 def wrong_derivative(s: Subject, rng: random.Random) -> None:
-    """Not offered, in a wrong mode, of what is no output or no input, without memory, of sizes that do not fit."""
+    """Not offered, in a wrong mode, of what is not an output or no input, without memory, of sizes that do not fit."""
     function = rng.choice(functions(s))
     if not s.unit.has_derivatives:
         memory = ctypes.create_string_buffer(64)

@@ -20,7 +20,7 @@ def pilot_plan(
     path: Path, *, devices: str, patience: float, practice: float = 0, repetitions: int = 1, people: int = 1,
     without: str = "",
 ) -> Path:  # fmt: skip
-    """Write the plan of scripted pilots: whatever leads the hand in tests is no person. `without`: tasks, by `|`."""
+    """Write the plan of scripted pilots: whatever leads the hand in tests is not a person. `without`: tasks, by `|`."""
     text = default_plan()
     if without:
         text = re.sub(_ABOUT_TASKS.format(without), "", text, flags=re.MULTILINE | re.DOTALL)

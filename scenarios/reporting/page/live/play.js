@@ -41,12 +41,12 @@
   function seedFault() {
     if (!seed) return "";
     const range = `from 0 to ${GREATEST_SEED}`, number = Number(seed.value);
-    if (seed.value === "") return `seed: it is no number: a whole number ${range} is right`;
-    if (!Number.isInteger(number)) return `seed: ${seed.value} is no whole number: one ${range} is right`;
+    if (seed.value === "") return `seed: it is not a number: expected a whole number ${range}`;
+    if (!Number.isInteger(number)) return `seed: ${seed.value} is not a whole number: expected one ${range}`;
     return number >= 0 && number <= GREATEST_SEED ? "" : `seed: ${seed.value} is out of range: a whole number ${range}`;
   }
 
-  // What is wrong stands beside its field; on top, which fields these are, and what is no field's.
+  // What is wrong stands beside its field; on top, which fields these are, and what is not a field's.
   function showFaults() {
     for (const [name, it] of fields) it.blame(told[name]);
     const wrong = Object.keys(told).filter(name => fields.has(name)).map(name => [name, `field-${name}`]);

@@ -28,7 +28,7 @@ def refused(address: str) -> str:
 
 @pytest.fixture(params=[b"", b"HTTP/1.1 400 Bad Request\r\nContent-Length: 0\r\n\r\n"], ids=["silent", "HTTP"])
 def other_server(request: pytest.FixtureRequest) -> Generator[str, None, None]:
-    """Gives the address of a server that accepts connections and is no scheduler."""
+    """Gives the address of a server that accepts connections and is not a scheduler."""
     accepted: list[socket.socket] = []
 
     def accept() -> None:
