@@ -330,7 +330,10 @@ def master_options(
             raise InvalidInput(f"no algorithm {algorithm!r}; {nearest(algorithm, known)}")
         algorithm = known[algorithm]
     names = tuple(dict.fromkeys(several_texts("isolate", isolate)))
-    given = {**({} if algorithm is None else {"algorithm": algorithm}), **({"isolated": names} if names else {})}
+    given: dict[str, Any] = {
+        **({} if algorithm is None else {"algorithm": algorithm}),
+        **({"isolated": names} if names else {}),
+    }
     for name, value in given.items():
         if getattr(chosen, name) not in (getattr(MasterOptions(), name), value):
             argument = "isolate" if name == "isolated" else name
