@@ -117,7 +117,7 @@ class Following:
             self._ambient = ambient if ambient >= p.ambient_least else 0.0
         ticks = self.without_ambient(ticks)
         distances = [self._calibration.distance(v) for v in ticks]
-        # a finger that sees goes on seeing down to fewer ticks: noise at the edge of sight is not a news
+        # a finger that sees goes on seeing down to fewer ticks: noise at the edge of sight is no news
         self._saw = [
             v >= (self._ticks_lost if saw else self._ticks_seen) for v, saw in zip(ticks, self._saw, strict=True)
         ]

@@ -167,7 +167,7 @@ def unknown_columns(header: Sequence[str], known: Iterable[str], what: str) -> l
     """Return a fault for each name that is not known; `what` says what the names should be of."""
     names = dict.fromkeys(known)
     unknown = (c for c in header if c not in names)
-    return [f"column {c!r} is not a {what} of the FMU: {near}" for c, near in hints(unknown, names)]
+    return [f"column {c!r}: the FMU has no such {what}: {near}" for c, near in hints(unknown, names)]
 
 
 def _rows(content: bytes, name: str) -> tuple[list[str], list[tuple[int, list[str]]]]:
@@ -177,7 +177,7 @@ def _rows(content: bytes, name: str) -> tuple[list[str], list[tuple[int, list[st
     except UnicodeDecodeError as e:
         raise InvalidTable(name, [f"it is not UTF-8: {e.reason} at byte {e.start}"]) from e
     except csv.Error as e:
-        raise InvalidTable(name, [f"it is not a CSV: {e}"]) from e
+        raise InvalidTable(name, [f"it is not CSV: {e}"]) from e
     if not rows or rows[0][1][0].strip().lower() != TIME:
         given = repr(rows[0][1][0][:40]) if rows else "nothing"
         raise InvalidTable(name, [f"its first line begins with {given}; expected names, of which time is the first"])

@@ -80,7 +80,9 @@ def _times(part: SspPart) -> tuple[float, float | None]:
             return start, None
         stop = part.number(experiment, "stopTime")
         if stop <= start:
-            raise part.fault(experiment, f"the default experiment ends at {stop:g} s; expected above {start:g} s")
+            raise part.fault(
+                experiment, f"the default experiment ends at {stop:g} s; expected a time above {start:g} s"
+            )
         return start, stop
     return 0.0, None
 

@@ -98,7 +98,7 @@ class ExternalInput:
 def _fault_of_integers(entries: NDArray[Any], dtype: np.dtype[Any]) -> str | None:
     """Return what is wrong with finite entries for an integer input, before they are cast to its type."""
     if (entries != np.round(entries)).any():
-        return f"expected whole numbers, got {entries.tolist()}"
+        return f"got {entries.tolist()}, expected whole numbers"
     limits = np.iinfo(dtype)
     if any(not limits.min <= n <= limits.max for n in entries.tolist()):
         return f"got {entries.tolist()}, which is out of range: from {limits.min} to {limits.max}"

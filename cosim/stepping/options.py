@@ -54,7 +54,7 @@ class AdaptiveStep:
         if faults:
             raise InvalidOptions(faults)
         faults = [
-            f"the {name} tolerance is {value!r}; expected a number from 0 on"
+            f"the {name} tolerance is {value!r}: expected a number from 0 on"
             for name, value in (("relative", self.relative), ("absolute", self.absolute))
             if not (math.isfinite(value) and value >= 0)
         ]

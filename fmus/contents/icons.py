@@ -27,7 +27,7 @@ class InvalidIcon(ValueError):
 
     def __init__(self, block: str, icon: object, fault: str) -> None:
         super().__init__(
-            f"icon = {icon!r} of {block}: {fault}; right is the name of a PNG beside the block's module, such as "
+            f"icon = {icon!r} of {block}: {fault}; expected the name of a PNG beside the block's module, such as "
             "'spring.png', and a drawing spring.svg beside that goes with it"
         )
         self.block, self.icon, self.fault = block, icon, fault

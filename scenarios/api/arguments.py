@@ -192,7 +192,7 @@ def path_of(name: str, value: Any) -> Path:
     Raises:
         InvalidInput: it is neither a text nor a path, is empty, or has a zero byte, which no file system takes.
     """
-    right = "a path, as a text or a Path,"
+    right = "a path, as a text or a Path"
     if value == "" or "\0" in str(value):
         raise InvalidInput(f"{name} = {value!r:.60}: expected {right}")
     return Path(of_type(name, value, (str, os.PathLike), right))
@@ -209,7 +209,7 @@ def several_texts(name: str, value: Any) -> tuple[str, ...]:
     Raises:
         InvalidInput: it is none, nor a list of some.
     """
-    right = "a text, or a list of texts,"
+    right = "a text, or a list of texts"
     given = (value,) if isinstance(value, str) else of_type(name, value, (Sequence, Set), right)
     return tuple(of_type(name, text, str, right) for text in given)
 
@@ -336,6 +336,5 @@ def master_options(
     }
     for name, value in given.items():
         if getattr(chosen, name) not in (getattr(MasterOptions(), name), value):
-            argument = "isolate" if name == "isolated" else name
-            raise InvalidInput(f"{argument}, options: both give {name!r}, in different ways; give one of them")
+            raise InvalidInput(f"{name!r} is given in options, too, and otherwise; give one of them")
     return replace(chosen, **given)

@@ -41,7 +41,7 @@ def unit(name: str, fmi: Literal[2, 3] = 3) -> Path:
     Raises:
         InvalidInput: there is no such unit, or it cannot be built in this standard.
     """
-    of_type("name", name, str, "the name of a unit, or the path of a block such as 'my_arm:MyArm',")
+    of_type("name", name, str, "the name of a unit, or the path of a block such as 'my_arm:MyArm'")
     if fmi not in (2, 3):
         raise InvalidInput(f"fmi = {fmi!r:.60}: expected 2 or 3")
     if ":" in name:

@@ -134,7 +134,7 @@ def sweep(
             scenario=name,
             points=points,
             fixed=set_parameters(
-                experiment, fixed, points, "{0} takes one value, and {1} are several: a list varies it"
+                experiment, fixed, points, "{0} takes one value, and {1} are several; give a list to vary it"
             ),
             repetitions=whole_number("seeds", seeds, 1),
             seed=common.seed,

@@ -7,6 +7,7 @@ from collections.abc import Generator, Sequence
 from pathlib import Path
 from types import TracebackType
 
+from handover.cosim.exceptions import one_line
 from handover.scenarios.campaign.run_servers import JobRunner
 from handover.scenarios.campaign.worker_pool import JobResult, RunJob, cores
 from handover.scenarios.results.run_folder import disk_errors_reported
@@ -64,12 +65,15 @@ class LocalPool:
                     job = waiting.get_nowait()
                 except queue.Empty:
                     return
-                done.put(runner.run(job, lambda: not left.is_set()))
+                try:
+                    done.put(runner.run(job, lambda: not left.is_set()))
+                except Exception as e:  # a thread that ends without a result would be waited for without end
+                    done.put(JobResult(name=job.name, lost=f"{type(e).__name__}: {one_line(e)}"))
 
         threads = [threading.Thread(target=work, args=(runner,), daemon=True) for runner in self._runners[: len(jobs)]]
-        for thread in threads:
-            thread.start()
         try:
+            for thread in threads:
+                thread.start()
             for _ in jobs:
                 yield done.get()
         except BaseException:
@@ -78,7 +82,8 @@ class LocalPool:
             raise
         finally:
             for thread in threads:
-                thread.join()
+                if thread.ident is not None:
+                    thread.join()
 
     def _end(self) -> None:
         """End the run servers, and their runs; later jobs get others."""

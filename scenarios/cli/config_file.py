@@ -236,7 +236,7 @@ def _checked(option: click.Parameter, ctx: click.Context, value: Any) -> Any:
     values = cast(list[Any], value) if several and isinstance(value, list) else [value]
     is_text = isinstance(option.type, (click.types.StringParamType, click.Path, click.Choice))
     if any(isinstance(v, bool) or not isinstance(v, str if is_text else (str, int, float)) for v in values):
-        right = "a text in quotes" if is_text else "a number, or a text that is one,"
+        right = "a text in quotes" if is_text else "a number, or a text that is one"
         raise click.BadParameter(f"expected {right}" + (", or several in [...]" if several else ""))
     texts = [_text(v) for v in values]
     given = texts if several else texts[0]

@@ -146,7 +146,7 @@ def _numbers(
             if not math.isfinite(value):
                 raise ValueError("it is not finite")
         except ValueError as e:
-            reason = f"; {e}" if convert is not float else "; expected a finite number"
+            reason = f"; {e}" if convert is not float else ": expected a finite number"
             faults.append(f"line {line}, column {column!r}: {cell[:40]!r}{reason}")
             value = 0
         values.append(value)

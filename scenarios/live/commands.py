@@ -91,7 +91,7 @@ def parse_command(text: str, longest: int = LONGEST) -> Command:
     try:
         members = decoded(text, _Members)
     except InvalidData as e:
-        raise InvalidCommand(f'expected {{"command": NAME, "value": VALUE}}: {e}') from e
+        raise InvalidCommand(f'not {{"command": NAME, "value": VALUE}}: {e}') from e
     return Command(members.command, members.value)
 
 

@@ -131,7 +131,7 @@ def hand_sample(content: Any) -> HandSample:
     try:
         sent = checked(content, _SentSample)
     except InvalidData as e:
-        raise InvalidHandMessage(f"expected an object with p_WH, q_WH, closed or angles, and stamp: {e}") from e
+        raise InvalidHandMessage(f"not an object with p_WH, q_WH, closed or angles, and stamp: {e}") from e
     faults = list[str]()
     norm = math.hypot(*sent.q_WH)
     if abs(norm - 1.0) > _UNIT:

@@ -122,7 +122,7 @@ def _fault_of_loader(content: bytes) -> str:
 
 
 def _fault_of_wasm(content: bytes) -> str:
-    return "" if content.startswith(b"\0asm") else "is not a WebAssembly, which begins with \\0asm"
+    return "" if content.startswith(b"\0asm") else "is not WebAssembly, which begins with \\0asm"
 
 
 def _fault_of_model(content: bytes) -> str:
@@ -147,6 +147,6 @@ FILES: Mapping[str, Callable[[bytes], str]] = {
 }
 """The files by their paths in the folder, and what is wrong with one, "" if nothing is."""
 _RIGHT = (
-    f"right is the unpacked npm package @mediapipe/tasks-vision, with {BUNDLE} and {LOADER},"
+    f"expected the unpacked npm package @mediapipe/tasks-vision, with {BUNDLE} and {LOADER},"
     f" and MediaPipe's model {MODEL} put into it"
 )

@@ -115,5 +115,5 @@ def _integer(text: str, fmi_type: str) -> int:
     if not (digits.isascii() and digits.isdecimal() and len(digits) < 40):
         raise ValueError(f"{text[:40]!r} is not a whole number")
     if not low <= int(text) <= high:
-        raise ValueError(f"{text[:40]} does not fit {fmi_type}: expected from {low} to {high}")
+        raise ValueError(f"{text[:40]} does not fit {fmi_type}: expected a number from {low} to {high}")
     return int(text)

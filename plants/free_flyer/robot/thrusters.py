@@ -128,7 +128,7 @@ class Params:
         """Raise InvalidThrusterParameters if limits, or stuck nozzles, leave no thrust at all in a direction."""
         given = (("f_max", "force along", self.f_max), ("tau_max", "torque about", self.tau_max))
         faults = [
-            f"{name}: there is no {what} {', '.join(axes)}; expected a value above 0, or propulsion IDEAL"
+            f"{name}: there is no {what} {', '.join(axes)}: expected a value above 0, or propulsion IDEAL"
             for name, what, most in given
             if self.propulsion is not Propulsion.IDEAL
             and (axes := [axis for axis, x in zip("xyz", np.asarray(most).tolist(), strict=True) if x == 0.0])

@@ -84,7 +84,7 @@ def _names(name: str) -> tuple[str, str]:
     if not _NAME.fullmatch(name) or name.endswith("_"):
         raise UsageError(f"{name!r} is not a name: expected letters, digits and underscores, such as TwoLinkArm")
     if len(name) > _LONGEST:
-        raise UsageError(f"{name[:30]}...: {len(name)} letters; at most {_LONGEST} are right for names of files")
+        raise UsageError(f"{name[:30]}...: {len(name)} letters; at most {_LONGEST} are possible in names of files")
     module = re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", name).lower()
     class_name = name if name[0].isupper() else "".join(part.capitalize() for part in name.split("_"))
     if taken := [name for name in (module, class_name) if keyword.iskeyword(name)]:

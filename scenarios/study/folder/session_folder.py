@@ -280,7 +280,7 @@ class SessionFolder:
         for name, question in questions.items():
             answer = answers.get(name, "")
             if answer and question.choices and answer not in question.choices:
-                faults.append(f"{name} = {answer!r}: expected {', '.join(question.choices)}")
+                faults.append(f"{name} = {answer!r}: expected one of {', '.join(question.choices)}")
         if faults:
             raise ValueError("; ".join(faults))
         kept = {name: str(answers[name]) for name in questions if answers.get(name)}

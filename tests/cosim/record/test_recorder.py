@@ -65,7 +65,7 @@ def test_a_stream_that_is_cut_off_within_a_block_costs_no_row(tmp_path: Path):
     recorder = Recorder(file)
     _record(recorder, x, 10)
     recorder.flush()
-    _record(recorder, x, 7)
+    _record(recorder, x, 7, first=10)
     counters = np.array(recorder.block.counters)
     recorder.flush()
     recorder.block.counters[:] = counters
@@ -191,11 +191,11 @@ def test_a_full_disk_is_reported_and_leaves_what_was_recorded(tmp_path: Path):
     assert complete_record(file) == 320
 
 
-def _record(recorder: Recorder, x: NDArray[np.float64], n: int, flushed: Sequence[int] = ()) -> None:
+def _record(recorder: Recorder, x: NDArray[np.float64], n: int, flushed: Sequence[int] = (), first: int = 0) -> None:
     signals = signals_of({"x": x})
     for i in range(n):
         x[:] = i
-        recorder(float(i), signals)
+        recorder(float(first + i), signals)
         if i in flushed:
             recorder.flush()
 

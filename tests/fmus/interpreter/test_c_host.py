@@ -135,7 +135,7 @@ LISTED: dict[str, tuple[str | None, dict[str, str], str]] = {
     "no interpreter": (
         None,
         {"PATH": "/bin:/usr/bin", "FMU_PYTHON": "/bin/true", "FMU_PYTHON_PROCESS": "0"},
-        "/bin/true cannot be run, or is not Python",
+        "/bin/true cannot be run, or is no Python",
     ),
     "no interpreter, apart": (
         None,

@@ -41,7 +41,7 @@
   function seedFault() {
     if (!seed) return "";
     const range = `from 0 to ${GREATEST_SEED}`, number = Number(seed.value);
-    if (seed.value === "") return `seed: it is not a number: expected a whole number ${range}`;
+    if (seed.value === "") return `seed: expected a whole number ${range}`;
     if (!Number.isInteger(number)) return `seed: ${seed.value} is not a whole number: expected one ${range}`;
     return number >= 0 && number <= GREATEST_SEED ? "" : `seed: ${seed.value} is out of range: a whole number ${range}`;
   }

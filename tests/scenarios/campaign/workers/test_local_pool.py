@@ -15,6 +15,7 @@ from support.scenarios.sample_jobs import bad_job, quick_job
 
 from handover.scenarios.campaign import local_pool
 from handover.scenarios.campaign.local_pool import LocalPool
+from handover.scenarios.campaign.run_servers import JobRunner
 from handover.scenarios.campaign.worker_pool import JobResult, RunJob, WorkerPool, cores
 
 pytestmark = [
@@ -80,6 +81,17 @@ def test_an_iteration_that_is_left_ends_its_runs(pool: WorkerPool, runs: Path, t
     results.close()
     assert servers(os.getpid()) == []
     assert [p.name for p in runs.iterdir()] == ["run"]
+
+
+def test_what_a_worker_raises_loses_its_run_and_no_other(runs: Path, monkeypatch: pytest.MonkeyPatch):
+    def run(_runner: JobRunner, job: RunJob, _wanted: object) -> JobResult:
+        if job.name == "run_1":
+            raise MemoryError("no room")
+        return JobResult(name=job.name)
+
+    monkeypatch.setattr(JobRunner, "run", run)
+    results = results_of(LocalPool(2), [quick_job(runs, f"run_{i}", seed=i) for i in range(3)])
+    assert [(r.name, r.lost) for r in results] == [("run_0", ""), ("run_1", "MemoryError: no room"), ("run_2", "")]
 
 
 def test_nobody_can_speak_to_it(pool: WorkerPool, runs: Path):
