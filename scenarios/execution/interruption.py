@@ -1,5 +1,6 @@
 """Ctrl-C: before a run it aborts at once; during a run the first ends the run after its step, the second aborts it."""
 
+import contextlib
 import functools
 import os
 import signal
@@ -110,16 +111,17 @@ class Interruption:
             self._take(number, frame)
 
     def _listen(self, ours: socket.socket) -> None:
-        while numbers := ours.recv(1):
-            if numbers[0] != signal.SIGINT:
-                continue
-            self._heard += 1
-            aborts = not self._running or self._heard > 1
-            if not aborts:
-                _say("ending after this step; Ctrl-C again to abort")
-            elif not self._handled.wait(_GRACE):
-                _say("Aborted! A unit did not return.")
-                leave(ABORTED)
+        with contextlib.suppress(OSError):  # a unit has closed it before it was listened to
+            while numbers := ours.recv(1):
+                if numbers[0] != signal.SIGINT:
+                    continue
+                self._heard += 1
+                aborts = not self._running or self._heard > 1
+                if not aborts:
+                    _say("ending after this step; Ctrl-C again to abort")
+                elif not self._handled.wait(_GRACE):
+                    _say("Aborted! A unit did not return.")
+                    leave(ABORTED)
 
 
 def _closing(end: socket.socket) -> Callable[[], None]:

@@ -37,7 +37,7 @@ def test_it_leaves_claims_figures_and_a_page_and_a_second_call_repeats_nothing(
     whole = IrTable().plan(quick=True)
     cylinder = [point for point in whole.points if point["thing"] == "cylinder"]
     few = replace(whole, points=cylinder, repetitions=1)
-    monkeypatch.setattr(EXPERIMENTS["ir-table"], "plan", lambda _experiment, _quick: few)  # type: ignore
+    monkeypatch.setattr(EXPERIMENTS["ir-table"], "plan", lambda _experiment, quick: few)  # type: ignore  # noqa: ARG005
     monkeypatch.setattr(pool_config, "LocalPool", InProcessPool.opened)
     folder = tmp_path / "c"
     first = paper("ir-table", "--quick", "--out", folder)
