@@ -23,9 +23,9 @@ from handover.scenarios.campaign.worker import (
     package_versions,
     run_job_on_worker,
 )
-from handover.scenarios.campaign.worker_pool import JobResult, RunJob
+from handover.scenarios.campaign.worker_pool import JobResult, RunJob, marked
 from handover.scenarios.execution.errors import ClusterLost, PoolError
-from handover.scenarios.results.run_folder import disk_errors_reported, versions
+from handover.scenarios.results.run_folder import versions
 
 _T = TypeVar("_T")
 
@@ -112,14 +112,8 @@ class ClusterPool:
         """
         found = self._ask(package_versions)
         self._raise_faults({worker: _difference(self._versions, other) for worker, other in found.items()})
-        token = uuid.uuid4().hex
-        mark = folder / f".{token}"
-        with disk_errors_reported(folder):
-            try:
-                mark.write_text(token, encoding="utf-8")
-                faults = self._ask(fault_of_folder, str(folder.absolute()), mark.name, token)
-            finally:
-                mark.unlink(missing_ok=True)
+        with marked(folder) as mark:
+            faults = self._ask(fault_of_folder, str(folder.absolute()), mark, mark)
         self._raise_faults(
             {w: f"cannot use {folder.absolute()}: {fault}" if fault else "" for w, fault in faults.items()}
         )

@@ -2,15 +2,13 @@
 
 import queue
 import threading
-import uuid
 from collections.abc import Generator, Sequence
 from pathlib import Path
 from types import TracebackType
 
 from handover.cosim.exceptions import one_line
 from handover.scenarios.campaign.run_servers import JobRunner
-from handover.scenarios.campaign.worker_pool import JobResult, RunJob, cores
-from handover.scenarios.results.run_folder import disk_errors_reported
+from handover.scenarios.campaign.worker_pool import JobResult, RunJob, cores, marked
 
 
 class LocalPool:
@@ -41,12 +39,8 @@ class LocalPool:
         Raises:
             RecordNotWritten: it cannot.
         """
-        mark = folder / f".{uuid.uuid4().hex}"
-        with disk_errors_reported(folder):
-            try:
-                mark.write_text(mark.name, encoding="utf-8")
-            finally:
-                mark.unlink(missing_ok=True)
+        with marked(folder):
+            pass
 
     def run_jobs(self, jobs: Sequence[RunJob]) -> Generator[JobResult, None, None]:
         """Give each job to a run server; yield the results as they come.

@@ -3,7 +3,9 @@
 `LocalPool` implements it on this machine, `ClusterPool` by Dask.
 """
 
+import contextlib
 import os
+import uuid
 from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -13,6 +15,7 @@ from typing import Any, BinaryIO, Protocol
 from handover.cosim.blocks.block import InvalidState
 from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.stepping.options import OPTION_RECORDS, MasterOptions
+from handover.scenarios.results.run_folder import disk_errors_reported
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,6 +122,22 @@ class WorkerPool(Protocol):
             ClusterLost: all workers were lost, and none came back.
         """
         ...
+
+
+@contextlib.contextmanager
+def marked(folder: Path) -> Generator[str, None, None]:
+    """Keep a file in a folder during the block, to show that it can be written to; give its name, its content too.
+
+    Raises:
+        RecordNotWritten: it cannot.
+    """
+    mark = folder / f".{uuid.uuid4().hex}"
+    with disk_errors_reported(folder):
+        try:
+            mark.write_text(mark.name, encoding="utf-8")
+            yield mark.name
+        finally:
+            mark.unlink(missing_ok=True)
 
 
 def cores() -> int:

@@ -50,7 +50,7 @@ def resume(
         if not folder.is_dir():
             raise UsageError(f"{folder} is not a folder; name that of a run")
         run_folder = RunFolder.of_run(folder)
-        run_folder.read_run()  # what is not a run's folder is told before what is missing here
+        run_folder.read_run()  # a folder that is not a run's is refused before what is missing here
         if not no_report:
             require_extra("reports", "report and figures", "--no-report")
         opened.enter_context(run_folder.held())

@@ -25,7 +25,7 @@ from handover.cosim.blocks.variable import Causality, Variable
 from handover.cosim.record.reader import Record
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PlacedUnit, System
-from handover.scenarios.experiment.exposed import carry, with_exposed
+from handover.scenarios.experiment.exposed import carry, check_exposed, with_exposed
 from handover.scenarios.experiment.live_inputs import HandHint, LedHand, Pushable
 from handover.scenarios.experiment.paper import PublishedValue
 from handover.scenarios.experiment.pictures import CameraPicture
@@ -241,6 +241,7 @@ class Experiment(abc.ABC, Generic[AnyEvaluator]):
         check_methods(cls, Experiment, _OF_SCENARIOS)
         if isinstance(build := vars(cls).get("build"), FunctionType):
             type.__setattr__(cls, "build", _carrying(build))
+        check_exposed(cls.parameters_type, getattr(cls, "units", ()))
         cls.places = with_exposed(cls.places, cls.parameters_type)
         if "name" not in vars(cls):
             cls.name = re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", cls.__name__).lower()

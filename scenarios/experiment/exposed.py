@@ -7,13 +7,14 @@ as another default with its origin, is said beside the path.
 
 import functools
 import typing
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
 from handover.cosim.blocks.declarations import DeclarationError
 from handover.cosim.blocks.origins import Origin
 from handover.cosim.blocks.ports import Need, declared_field
+from handover.cosim.exceptions import nearest
 from handover.cosim.system.system import System
 from handover.scenarios.experiment.places import Place
 
@@ -54,8 +55,9 @@ def expose(
     own["needs"] = needs or None
     declaration = replace(metadata["declaration"], **{k: v for k, v in own.items() if v is not None})
     hint = metadata.get("type", _hints(params)[name])
-    exposes = tuple(path for path in paths if "." in path) or metadata.get("exposes", ())
-    return declared_field(declaration, type=hint, exposes=exposes)
+    own_paths = tuple(path for path in paths if "." in path)
+    exposes = own_paths or metadata.get("exposes", ())
+    return declared_field(declaration, type=hint, exposes=exposes, of_units=bool(own_paths))
 
 
 @functools.cache
@@ -70,6 +72,26 @@ def exposed(parameters: Any) -> Iterator[tuple[str, str, str]]:
             for path in f.metadata.get("exposes", ()):
                 unit, _, name = path.partition(".")
                 yield f.name, unit, name
+
+
+def check_exposed(parameters: Any, units: Iterable[str]) -> None:
+    """Check that each exposed parameter is one of a unit that the scenario has.
+
+    A class of parameters may serve several scenarios, of which each has one of the units. What is exposed by way of
+    another scenario's parameter, the scenario itself may read instead.
+
+    Raises:
+        DeclarationError: the scenario has none of a parameter's units.
+    """
+    if not is_dataclass(parameters):
+        return
+    known = list(units)
+    for f in fields(parameters):
+        of = [path.partition(".")[0] for path in f.metadata.get("exposes", ())]
+        if f.metadata.get("of_units") and not set(of) & set(known):
+            owner = parameters if isinstance(parameters, type) else type(parameters)
+            fault = f"there is no unit {of[0]!r} to expose it of; {nearest(of[0], known)}"
+            raise DeclarationError(owner.__name__, f.name, fault)
 
 
 def carry(parameters: Any, system: System) -> System:

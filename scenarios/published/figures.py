@@ -123,7 +123,7 @@ class Spans:
 
 @dataclass(frozen=True)
 class Panel:
-    """A panel: what is drawn into it, and what its axes are told by matplotlib's names.
+    """A panel: what is drawn into it, and what its axes get by matplotlib's names.
 
     Attributes:
         marks: in their order.

@@ -47,7 +47,7 @@ class Runs:
     def of_plan(
         cls, table: CampaignTable, plan: CampaignPlan, keep: Callable[[Row], bool], free: Sequence[str] = ()
     ) -> "Runs":
-        """Return the runs to keep; points are told apart by all parameters that the plan varies but the free ones.
+        """Return the runs to keep; points differ by all parameters that the plan varies but the free ones.
 
         Raises:
             KeyError: the table has no column of a parameter that each point of the plan sets.

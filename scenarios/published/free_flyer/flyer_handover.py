@@ -81,7 +81,7 @@ _SAME = 0.001
 _MIN_FREE = 4
 """Runs without a gate of which something is concluded."""
 _DIFFERING_RATIO = 1.5
-"""Compliant over rigid displacement from which on the behaviours are told apart."""
+"""Compliant over rigid displacement from which on the behaviours differ."""
 
 
 def point_of(task: Task, behaviour: Behaviour, propulsion: Propulsion, variation: Variation = USUAL) -> Point:

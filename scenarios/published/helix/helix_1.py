@@ -146,7 +146,7 @@ class Helix1(PublishedExperiment):
         return thesis, fitted, own
 
     def spread(self, table: CampaignTable) -> dict[Case, Runs]:
-        """Return the runs at the smallest step size by what was amiss, first those without; nothing without a case."""
+        """Return the runs at the smallest step size by disturbance, first those without; nothing without a case."""
         runs = self.runs(table, free=("place",))
         found = {case: runs.of(_point(Tuning.THESIS, ALPHAS[0], case)) for case in (NOTHING, *CASES)}
         found = {case: rows for case, rows in found.items() if len(rows)}
@@ -584,7 +584,7 @@ class _NoMinor:
 
 
 def spread_tables(found: Mapping[Case, Runs]) -> list[ComparisonTable]:
-    """Return the times by what is amiss beside the published ones; nothing if no such run is there."""
+    """Return the times by disturbance beside the published ones; nothing if no such run is there."""
     if not found:
         return []
     mean, std, median, low, high = (PRINTED[f"arm_time_{x}"][0] for x in ("mean", "std", "median", "min", "max"))

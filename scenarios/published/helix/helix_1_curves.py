@@ -40,7 +40,7 @@ _MIN_SIGNS = next(n for n in range(1, 64) if 2.0 ** (1 - n) < LEVEL)
 _AT_BOUND = 0.01
 """How near to a bound counts as at it, as a part of it: to no more digits a length can be read off a figure."""
 _SIMILAR = 2 * FIG_9_RESOLUTION
-"""How much two lengths of fig. 9 and its likes may differ that are told as very similar, m."""
+"""How much two lengths, as of fig. 9, may differ that are called very similar, m."""
 _ON_BALL = [int(phase) for phase in (Phase.DESCEND, Phase.GRASP, Phase.HOLD)]
 _MODEL_SIGNALS = ("servo.q_sys", "servo.q_est", "servo.p_WO_est", "servo.p_WR_est", "servo.p_WG_est")
 

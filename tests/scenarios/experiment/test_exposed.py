@@ -17,7 +17,7 @@ from handover.cosim.blocks.variable import Causality
 from handover.cosim.system.system import PlacedUnit, System
 from handover.fmus.catalog import find_unit, import_class
 from handover.scenarios.catalog import SCENARIOS
-from handover.scenarios.experiment.exposed import carry, expose, exposed, with_exposed
+from handover.scenarios.experiment.exposed import carry, check_exposed, expose, exposed, with_exposed
 from handover.scenarios.experiment.places import Place
 
 
@@ -48,6 +48,19 @@ def test_what_a_unit_does_not_declare_is_refused():
     with pytest.raises(DeclarationError) as e:
         expose(Params, "a.weight")
     assert (e.value.owner, e.value.field) == ("Params", "weight")
+
+
+def test_a_unit_that_the_scenario_has_not_is_refused():
+    check_exposed(Parameters, ("b", "c"))
+    with pytest.raises(DeclarationError) as e:
+        check_exposed(Parameters, ("a", "cc"))
+    assert (e.value.owner, e.value.field) == ("Parameters", "other")
+
+    @dataclass(frozen=True, kw_only=True)
+    class OfAnother:
+        other: float = expose(Parameters, "other")
+
+    check_exposed(OfAnother, ("a",))
 
 
 def test_all_units_get_the_value_but_where_they_are_set_to_another():
