@@ -35,6 +35,11 @@ MOST_FAULTS = 20
 """Faults of a list that a message has; for more, valid names are not looked for, either."""
 
 
+def counted(n: int, one: str, many: str = "") -> str:
+    """Return how many there are, such as "1 run" or "3 runs"; `many` is the plural that is no `one` with an s."""
+    return f"{n} {one if n == 1 else many or one + 's'}"
+
+
 def first_faults(faults: Sequence[str]) -> list[str]:
     """Return the first of a list of faults as a message has them, and how many more there are, as the last."""
     more = len(faults) - MOST_FAULTS
@@ -198,7 +203,7 @@ class WiringError(CosimError):
 
     def __init__(self, faults: Sequence[str]) -> None:
         lines = "".join(f"\n  - {f}" for f in first_faults(faults))
-        super().__init__(f"{len(faults)} fault{'s' if len(faults) > 1 else ''} in the system:{lines}")
+        super().__init__(f"{counted(len(faults), 'fault')} in the system:{lines}")
         self.faults = tuple(faults)
 
 

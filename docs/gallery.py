@@ -16,6 +16,7 @@ from support.in_process_pool import use_in_process_pool
 from support.kept_runs import kept_run
 
 import handover
+from handover.cosim.exceptions import counted
 from handover.cosim.system.graph import system_svg
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.display_unit import unit_symbol
@@ -152,8 +153,7 @@ class GalleryExperiment:
     @property
     def extent(self) -> str:
         """How many runs there are here, of how many, as a sentence."""
-        number = "is one run" if self.runs == 1 else f"are {self.runs} runs"
-        return f"Here {number} of its {self.whole:,}; `--quick` makes {self.quick}."
+        return f"Shown: {counted(self.runs, 'run')} of its {self.whole:,}; `--quick` makes {self.quick}."
 
     @property
     def verdicts(self) -> str:

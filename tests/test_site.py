@@ -166,7 +166,7 @@ def test_a_sentence_says_how_many_runs_there_are():
     """In the number's grammar, and in thousands."""
     made = maker("gallery").GalleryExperiment
     one, many = (made("", "", "", runs, 2, 1280, (), (), {}, ()).extent for runs in (1, 5))
-    assert (one.split(";")[0], many.split(";")[0]) == ("Here is one run of its 1,280", "Here are 5 runs of its 1,280")
+    assert (one.split(";")[0], many.split(";")[0]) == ("Shown: 1 run of its 1,280", "Shown: 5 runs of its 1,280")
 
 
 def test_every_published_experiment_is_run_for_the_gallery():

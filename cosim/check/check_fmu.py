@@ -15,7 +15,7 @@ from pathlib import Path, PurePosixPath
 from handover.cosim.check.description_checks import description_findings, interface_findings, says
 from handover.cosim.check.experiment_check import ExperimentCheck
 from handover.cosim.check.report import EXPERIMENTS, RUN, CheckReport, Section
-from handover.cosim.exceptions import InvalidFmu
+from handover.cosim.exceptions import InvalidFmu, counted
 from handover.cosim.experiments.manifest import MANIFEST, related_files
 from handover.cosim.experiments.reference_experiment import ReferenceExperiment, experiments_in
 from handover.cosim.files import scratch_folder
@@ -216,7 +216,7 @@ class _Check:
             findings.append(warning(what, where=backslashes[0], cure="zip it with slashes"))
         is_folder, n = self.path.is_dir(), len(self.archive.names)
         size = sum(map(self.archive.size, self.archive.names)) if is_folder else self.path.stat().st_size
-        return f"{n} file{'s' if n != 1 else ''} in {math.ceil(size / 1000)} kB", findings
+        return f"{counted(n, 'file')} in {math.ceil(size / 1000)} kB", findings
 
     def _description(self) -> tuple[str, list[Finding]]:
         self.root = checked_xml(self.archive)
@@ -225,7 +225,7 @@ class _Check:
         own = description_findings(self.root, self.fmi, variables)
         self.can_continue = True
         n = len(variables)
-        text = f"{self.root.get('modelName')}, FMI {self.root.get('fmiVersion')}, {n} variable{'s' if n != 1 else ''}"
+        text = f"{self.root.get('modelName')}, FMI {self.root.get('fmiVersion')}, {counted(n, 'variable')}"
         findings = [*standard_findings(self.path, own), *own]
         self.is_described = all(f.level is not Level.FAULT for f in findings)
         return text, [*findings, *terminal_findings(self.archive, self._terminals(variables))]
@@ -255,7 +255,7 @@ class _Check:
     def _references(self) -> tuple[str, list[Finding]]:
         files, findings = related_files(self.archive)
         self.experiments, more = experiments_in(files)
-        return f"{len(files)} related file{'s' if len(files) != 1 else ''}", [*findings, *more]
+        return counted(len(files), "related file"), [*findings, *more]
 
     def _binaries(self) -> tuple[str, list[Finding]]:
         findings = list(binary_findings(self.archive, self.fmi, self.identifier))

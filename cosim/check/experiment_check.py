@@ -10,7 +10,7 @@ from pathlib import Path
 
 from handover.cosim.blocks.declarations import short_repr
 from handover.cosim.blocks.variable import Kind
-from handover.cosim.exceptions import nearest
+from handover.cosim.exceptions import counted, nearest
 from handover.cosim.experiments.experiment_run import (
     communication_points,
     result_columns,
@@ -92,7 +92,7 @@ class ExperimentCheck:
         result = read_table(files["result"].read_bytes(), "result", columns)
         compared = differences(reference, result, columns)
         findings += _judged(compared, experiment.setup)
-        n_outputs = f"{len(compared)} output{'s' if len(compared) != 1 else ''}"
+        n_outputs = counted(len(compared), "output")
         if absent := len(set(points) - set(reference.times)):
             n_outputs += f" at {n + 1 - absent} of {n + 1} points"
             if experiment.setup.step is not None:

@@ -8,6 +8,7 @@ import numpy as np
 
 from handover.cosim.blocks.units import UNKNOWN, Unit
 from handover.cosim.blocks.variable import Kind
+from handover.cosim.exceptions import counted
 from handover.cosim.fmu.file.description import FmuPort
 from handover.cosim.ssp.connected_ports import Entry
 from handover.cosim.ssp.parameter_set import SspValue
@@ -111,7 +112,7 @@ def _value(port: FmuPort, index: int | None, given: Given) -> Any:
     value, shape = given.value, port.shape if index is None else ()
     size = port.size if index is None else 1
     if len(value.texts) != size:
-        raise ValueError(f"{len(value.texts)} values where {size} {'is' if size == 1 else 'are'} right")
+        raise ValueError(f"{len(value.texts)} values where {counted(size, 'is', 'are')} right")
     if port.kind is not Kind.REAL:
         if (given.then or value.linear) is not None:
             raise ValueError(f"a linear transformation of {port.kind.value} values; only reals can be transformed")

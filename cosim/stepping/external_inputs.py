@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from handover.cosim.blocks.declarations import short_repr
 from handover.cosim.blocks.start_values import fault_of
 from handover.cosim.blocks.variable import Kind
-from handover.cosim.exceptions import UnitFailure
+from handover.cosim.exceptions import UnitFailure, counted
 from handover.cosim.fmu.file.description import FmuPort
 from handover.cosim.fmu.instance import Instance
 from handover.cosim.fmu.start_values import entries_of
@@ -77,8 +77,7 @@ class ExternalInput:
 
     def _fault(self, entries: NDArray[Any]) -> str | None:
         if len(entries) != self._port.size:
-            right = "is" if self._port.size == 1 else "are"
-            return f"got {len(entries)} values where {self._port.size} {right} right"
+            return f"got {len(entries)} values where {counted(self._port.size, 'is', 'are')} right"
         if entries.dtype.kind not in "biuf":
             return f"got {short_repr(entries.tolist())}, which is not an array of numbers"
         if self._port.kind is not Kind.BOOLEAN and not np.isfinite(entries.astype(np.float64)).all():

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
-from handover.cosim.exceptions import UnitFailure
+from handover.cosim.exceptions import UnitFailure, counted
 from handover.cosim.stepping.ensemble import Ensemble, SavedStates
 from handover.cosim.stepping.interface import Interface, Magnitudes
 from handover.cosim.stepping.solvers import InterfaceSolver, Unsolved
@@ -88,7 +88,7 @@ class NotConverged(UnitFailure):
     @property
     def what(self) -> str:
         """What happened, to be read after the call."""
-        count = f"{self.iterations} iteration{'s' if self.iterations > 1 else ''}"
+        count = counted(self.iterations, "iteration")
         return f"found no solution in {count}: {self.why}"
 
     @property

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from handover.cosim.blocks.variable import Kind
-from handover.cosim.exceptions import ScheduleError
+from handover.cosim.exceptions import ScheduleError, counted
 from handover.cosim.fmu.file.description import FmuDescription
 from handover.cosim.system.ordering import DescribeWait, Needs, ordered, strongly_connected
 from handover.cosim.system.system import Connection, PortName, System
@@ -125,7 +125,7 @@ def _loop(
     )
     more = len(connections) - len({c for c, _ in shortest})
     if more:
-        message += f" (and {more} more connection{'s' if more > 1 else ''} between these outputs and inputs)"
+        message += f" (and {counted(more, 'more connection')} between these outputs and inputs)"
     is_presumed = any((c.target, y) in doubtful for y, cs in kept.items() for c in cs)
     return AlgebraicLoop(tuple(cycle), connections, message, is_presumed)
 
@@ -262,7 +262,7 @@ def check_loops(system: System, loops: Sequence[AlgebraicLoop]) -> None:
     if not faults:
         return
     lines = "".join(f"\n  - {loop.message}: {fault}" for loop, fault in faults)
-    n = f"{len(faults)} algebraic loop{'s' if len(faults) > 1 else ''}"
+    n = counted(len(faults), "algebraic loop")
     raise ScheduleError(f"{n} cannot be solved (outputs depend on themselves by direct feedthrough):{lines}")
 
 

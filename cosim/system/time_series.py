@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.variable import Kind
+from handover.cosim.exceptions import counted
 from handover.cosim.fmu.file.description import FmuPort
 
 SETTABLE_KINDS = (Kind.REAL, Kind.INTEGER, Kind.BOOLEAN, Kind.ENUMERATION)
@@ -60,7 +61,7 @@ class TimeSeries:
         if port.clocks:
             return f"it can be set only while its clock {port.clocks[0]} ticks, so it cannot follow values over time"
         if self.values.shape[1] != port.size:
-            return f"{self.values.shape[1]} values a time where {port.size} {'is' if port.size == 1 else 'are'} right"
+            return f"{self.values.shape[1]} values a time where {counted(port.size, 'is', 'are')} right"
         return None if not self.linear or port.is_continuous else "its values are held: it does not vary continuously"
 
 

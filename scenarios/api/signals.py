@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 from numpy.typing import NDArray
 
 from handover.cosim.blocks.ports import Floats
+from handover.cosim.exceptions import counted
 from handover.cosim.record.reader import Record
-from handover.scenarios.experiment.display_unit import counted
 from handover.scenarios.results.run_facts import elements_of
 
 if TYPE_CHECKING:

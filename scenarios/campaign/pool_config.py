@@ -9,6 +9,7 @@ from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from handover.cosim.exceptions import counted
 from handover.scenarios.campaign.local_pool import LocalPool
 from handover.scenarios.campaign.worker_pool import JobResult, RunJob, WorkerPool, cores
 
@@ -29,8 +30,7 @@ class PoolConfig:
         """Return such as "2 workers"."""
         if self.scheduler is not None:
             return f"the workers of {self.scheduler}"
-        workers = self.workers or cores()
-        return f"{workers} worker{'s' if workers > 1 else ''}"
+        return counted(self.workers or cores(), "worker")
 
     def check(self) -> None:
         """Check that a scheduler answers at its address.

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
-from handover.cosim.exceptions import one_line
+from handover.cosim.exceptions import counted, one_line
 from handover.cosim.files import scratch_folder
 from handover.cosim.typed_data import read_typed
 from handover.scenarios.campaign.folder import CampaignFolder
@@ -20,7 +20,7 @@ from handover.scenarios.campaign_report.points import points_section, success_se
 from handover.scenarios.campaign_report.runs import failures_section, runs_section
 from handover.scenarios.campaign_report.settings import figures_section, setting_section
 from handover.scenarios.campaign_report.spread_section import spread_section
-from handover.scenarios.experiment.display_unit import counted, display_unit
+from handover.scenarios.experiment.display_unit import display_unit
 from handover.scenarios.published.catalog import EXPERIMENTS
 from handover.scenarios.published.published_experiment import (
     Claim,
@@ -62,7 +62,7 @@ def _verdict(results: CampaignResults) -> Markup:
     done, failed, lost = (int(np.count_nonzero(status == s)) for s in ("done", "failed", "lost"))
     parts = [f"in {results.successes} of {counted(done, 'run')} done the task succeeded"]
     parts += [f"{failed} failed to run"] if failed else []
-    parts += [f"{lost} {'was' if lost == 1 else 'were'} lost"] if lost else []
+    parts += [f"{counted(lost, 'was', 'were')} lost"] if lost else []
     sentence = "; ".join(parts) + "."
     if ended < planned:
         so_far = Markup("<b>{} of {} runs so far</b>; run the same command again to resume.").format(ended, planned)
@@ -77,8 +77,7 @@ def _plan(results: CampaignResults) -> str:
     varied = [f"{name.replace('_', ' ')} ({_values(results, name)})" for name in results.varied]
     points, repetitions = len(metadata["points"]), int(metadata["repetitions"])
     parts = [f"Varied: {'; '.join(varied)}" if varied else "Nothing is varied"]
-    number = counted(points, "point") if points != 1 else "One point"
-    parts.append(f"{number}, {counted(repetitions, 'run')} each; campaign's seed {metadata['seed']}")
+    parts.append(f"{counted(points, 'point')}, {counted(repetitions, 'run')} each; campaign's seed {metadata['seed']}")
     if metadata.get("paired"):
         parts.append("Runs of a repetition share a seed, so that points can be compared run by run")
     return ". ".join(parts) + "."

@@ -5,9 +5,9 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from markupsafe import Markup
 
+from handover.cosim.exceptions import counted
 from handover.scenarios.campaign.results import CampaignResults, PointResults
 from handover.scenarios.campaign.statistics import paired_test
-from handover.scenarios.experiment.display_unit import counted
 from handover.scenarios.reporting.html import Cell, rows_table
 from handover.scenarios.reporting.page import Section
 

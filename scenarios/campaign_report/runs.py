@@ -11,11 +11,11 @@ from urllib.parse import quote
 import numpy as np
 from markupsafe import Markup
 
+from handover.cosim.exceptions import counted
 from handover.scenarios.campaign.results import CampaignResults
 from handover.scenarios.experiment.display_unit import (
     DisplayUnit,
     column_text,
-    counted,
     digits_after_point,
     display_unit,
 )
@@ -147,8 +147,8 @@ def failures_section(results: CampaignResults, folder: Path) -> Section | None:
         for g in groups[:_MAX_REASONS]
     ]
     left = len(groups) - _MAX_REASONS
-    line = Markup("<p class='soft'>{} more reason{}, of fewer runs each.</p>")
-    more = line.format(left, "s" if left > 1 else "") if left > 0 else Markup()
+    line = Markup("<p class='soft'>{}, of fewer runs each.</p>")
+    more = line.format(counted(left, "more reason")) if left > 0 else Markup()
     merged = any(len(g.reasons) > 1 for g in groups[:_MAX_REASONS])
     same = Markup("<p class='soft'>Runs whose reasons differ only in numbers are in one row, with the first one's.</p>")
     table = rows_table(("runs", "how", "reason, such as", "examples"), rows, numbers=(0,), cards=True)

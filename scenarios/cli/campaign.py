@@ -19,7 +19,7 @@ from typing import NoReturn, TextIO
 
 from rich.progress import BarColumn, TextColumn
 
-from handover.cosim.exceptions import RecordNotWritten
+from handover.cosim.exceptions import RecordNotWritten, counted
 from handover.scenarios.campaign.campaign import run_campaign
 from handover.scenarios.campaign.folder import CampaignFolder, default_folder
 from handover.scenarios.campaign.plan import CampaignPlan
@@ -266,7 +266,7 @@ def _run(
     plan = ready.plan
     if not folder.has_all(plan):
         done = sum(map(folder.is_done, plan.runs()))
-        text = f"{plan.size} run{'s' if plan.size > 1 else ''} of {plan.scenario} on {workers} into {folder.path}"
+        text = f"{counted(plan.size, 'run')} of {plan.scenario} on {workers} into {folder.path}"
         say(f"{text}{f'; {done} are done' if done else ''}")
     try:
         with contextlib.ExitStack() as opened, progress:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from handover.cosim.exceptions import nearest
+from handover.cosim.exceptions import counted, nearest
 from handover.scenarios.campaign.folder import PARAMETER_UNITS
 from handover.scenarios.campaign.results import CampaignResults, PointResults
 from handover.scenarios.campaign.statistics import (
@@ -27,7 +27,6 @@ from handover.scenarios.campaign.statistics import (
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.campaign_report.point_layout import PointLayout, layout_of, list_layout
 from handover.scenarios.comparison.entries import CampaignEntry, NotComparable, full_parameters
-from handover.scenarios.experiment.display_unit import counted
 
 ENTRY = "in campaign"
 """The parameter, in the table of all, that tells the campaigns apart; no parameter has a name with a space."""

@@ -8,6 +8,7 @@ from urllib.parse import quote
 
 from markupsafe import Markup
 
+from handover.cosim.exceptions import counted
 from handover.scenarios.comparison.campaigns import (
     MAX_TESTS,
     ComparedCampaigns,
@@ -17,7 +18,7 @@ from handover.scenarios.comparison.campaigns import (
 )
 from handover.scenarios.comparison.entries import CampaignEntry, Difference, Entry, RunEntry
 from handover.scenarios.comparison.runs import MetricRow
-from handover.scenarios.experiment.display_unit import counted, display_unit
+from handover.scenarios.experiment.display_unit import display_unit
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import PRINTED_FORMATS
 from handover.scenarios.reporting.html import Cell, rows_table
@@ -67,7 +68,7 @@ def campaign_outcome(entry: CampaignEntry) -> str:
     if ended > done:
         text += f", {ended - done} failed to run or were lost"
     left = results.planned - ended
-    return f"{text}, {left} {'is' if left == 1 else 'are'} still to be done" if left > 0 else text
+    return f"{text}, {counted(left, 'is', 'are')} still to be done" if left > 0 else text
 
 
 def differences_section(entries: Sequence[Entry], differences: Sequence[Difference]) -> Section:

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 
 import click
 
-from handover.cosim.exceptions import CosimError, RecordNotWritten, UnitFailure, WiringError, first_faults
+from handover.cosim.exceptions import CosimError, RecordNotWritten, UnitFailure, WiringError, counted, first_faults
 from handover.scenarios.execution.exit_status import UNIT_FAILED, USAGE_ERROR
 
 
@@ -74,8 +74,7 @@ def one_line_errors() -> Generator[None, None, None]:
     except ClusterLost as e:
         raise WorkersLost(str(e)) from e
     except WiringError as e:
-        number = f"{len(e.faults)} fault{'s' if len(e.faults) > 1 else ''}"
-        raise UsageError(f"{number} in the system: {'; '.join(first_faults(e.faults))}") from e
+        raise UsageError(f"{counted(len(e.faults), 'fault')} in the system: {'; '.join(first_faults(e.faults))}") from e
     except (CosimError, InvalidParameter, InvalidRunFolder, ScenarioFailed, WrongType) as e:
         raise UsageError(str(e)) from e
     except (PoolError, NotCompiled, UnknownPlatform, PackageFailure) as e:

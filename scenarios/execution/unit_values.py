@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from handover.cosim.blocks.variable import Causality, Kind
-from handover.cosim.exceptions import CosimError, nearest
+from handover.cosim.exceptions import CosimError, counted, nearest
 from handover.cosim.fmu.file.description import FmuPort
 from handover.cosim.fmu.start_values import entries_of
 from handover.cosim.system.system import PlacedUnit, System
@@ -80,7 +80,7 @@ def _set(start: dict[str, Any], port: FmuPort, k: int | None, text: str) -> None
     if k is None:
         values = _entries(port, text.split(","))
         if len(values) != port.size:
-            raise ValueError(f"{len(values)} values where {port.size} {'is' if port.size == 1 else 'are'} right")
+            raise ValueError(f"{len(values)} values where {counted(port.size, 'is', 'are')} right")
     else:
         values = entries_of(port, start)
         values[k] = value_of(port, text)

@@ -45,11 +45,6 @@ class DisplayUnit:
         return f"{digits}{space}{self.symbol}".rstrip()
 
 
-def counted(n: int, one: str, many: str = "") -> str:
-    """Return how many there are, such as "1 run" or "3 runs"; `many` is the plural that is no `one` with an s."""
-    return f"{n} {one if n == 1 else many or one + 's'}"
-
-
 def digits_after_point(values: ArrayLike) -> int:
     """Return with how many digits after the point to show all numbers of a column: the largest has four digits.
 

@@ -9,7 +9,7 @@ from handover.cosim.blocks.declarations import short_repr
 from handover.cosim.blocks.ports import Need
 from handover.cosim.blocks.start_values import fault_of, range_of
 from handover.cosim.blocks.variable import Kind, Variable
-from handover.cosim.exceptions import MOST_FAULTS, first_faults, nearest, suggestion
+from handover.cosim.exceptions import MOST_FAULTS, counted, first_faults, nearest, suggestion
 from handover.scenarios.experiment.experiment import Experiment
 
 
@@ -150,7 +150,7 @@ def parse_value(variable: Variable, text: str) -> tuple[Any, str | None]:
     if fault and valid_range and valid_range not in fault:
         fault += f", {valid_range}"
     if fault and variable.shape and given not in (0, variable.size):
-        fault += f": it takes {variable.size} numbers, {given} {'is' if given == 1 else 'are'} given"
+        fault += f": it takes {variable.size} numbers, {counted(given, 'is', 'are')} given"
     if fault and variable.items and (hint := suggestion(text, [n.lower() for n, _ in variable.items])):
         fault += f"; {hint}"
     return value, fault

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
+from handover.cosim.exceptions import counted
 from handover.scenarios.film import LARGEST
 from handover.scenarios.film.browser import open_camera, window_of
 from handover.scenarios.film.encoder import film_to
@@ -109,10 +110,9 @@ def _check_room(content: FilmContent, size: tuple[int, int]) -> None:
         )
     cure = f"--size {width}x{needed} has room for {'it' if count == 1 else 'them'}"
     if most == 0:
-        fault = "1 plot does not" if count == 1 else f"{count} plots do not"
+        fault = counted(count, "plot does not", "plots do not")
         raise NotFilmed(f"{fault} fit into {width}x{height} pixels; {cure}, --no-plots shows the scene alone")
-    fit = f"{most} {'does' if most == 1 else 'do'}"
-    raise NotFilmed(f"{count} plots do not fit into {width}x{height} pixels, {fit}; {cure}")
+    raise NotFilmed(f"{count} plots do not fit into {width}x{height} pixels, {counted(most, 'does', 'do')}; {cure}")
 
 
 def _height_for(count: int, size: tuple[int, int], *, scene: bool) -> int | None:

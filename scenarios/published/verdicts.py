@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
+from handover.cosim.exceptions import counted
 from handover.scenarios.campaign.statistics import (
     LEVEL,
     RESAMPLES,
@@ -24,7 +25,6 @@ from handover.scenarios.campaign.statistics import (
     time_interval,
     two_proportions,
 )
-from handover.scenarios.experiment.display_unit import counted
 from handover.scenarios.published.published_experiment import Claim, Verdict
 
 FEW = 0.10

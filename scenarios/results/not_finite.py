@@ -11,6 +11,7 @@ from typing import Any, TypedDict
 import numpy as np
 
 from handover.cosim.blocks.variable import SUBSCRIPT
+from handover.cosim.exceptions import counted
 from handover.cosim.system.system import System
 
 MAX_LINES = 5
@@ -100,8 +101,8 @@ def not_finite_lines(outputs: Sequence[Mapping[str, Any]]) -> list[str]:
     lines = [_line(output) for output in outputs[:MAX_LINES]]
     more = len(outputs) - MAX_LINES
     if more > 0:
-        which = "output is" if more == 1 else "outputs are"
-        lines.append(f'{more} more {which} not finite: summary.json has them all, by "not_finite"')
+        which = counted(more, "more output is", "more outputs are")
+        lines.append(f'{which} not finite: summary.json has them all, by "not_finite"')
     return lines
 
 

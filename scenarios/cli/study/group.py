@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from handover.cosim.exceptions import first_faults
+from handover.cosim.exceptions import counted, first_faults
 from handover.cosim.files import FileTaken
 from handover.scenarios.cli.command import DeferredCommand, DeferringGroup
 from handover.scenarios.cli.console import open_console, print_json, print_rows
@@ -128,9 +128,8 @@ def checked_plan(file: Path) -> "StudyPlan":
 
 
 def _refused(file: Path, faults: Sequence[str]) -> UsageError:
-    number = f"{len(faults):,} fault{'s' if len(faults) > 1 else ''}"
     lines = "".join(f"\n  {fault}" for fault in first_faults(faults))
-    return UsageError(f"{file}: {number} in the plan{lines}")
+    return UsageError(f"{file}: {counted(len(faults), 'fault')} in the plan{lines}")
 
 
 def plan_data(plan: "StudyPlan", participants: int) -> dict[str, Any]:

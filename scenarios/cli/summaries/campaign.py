@@ -9,13 +9,14 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from handover.cosim.exceptions import counted
 from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.results import CampaignResults, PointResults
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.campaign.worker_pool import RunCounts
 from handover.scenarios.cli.campaign import format_progress
 from handover.scenarios.cli.console import heading, open_console
-from handover.scenarios.experiment.display_unit import counted, display_unit
+from handover.scenarios.experiment.display_unit import display_unit
 
 _MAX_POINTS = 12
 _MAX_REASONS = 5
@@ -95,4 +96,4 @@ def print_reasons(console: Console, table: CampaignTable) -> None:
     for (status, reason), number in reasons.most_common(_MAX_REASONS):
         console.print(f"{number} {status}: {reason}", markup=False, soft_wrap=True)
     if left := max(0, len(reasons) - _MAX_REASONS):
-        console.print(f"and {left} more reason{'s' if left > 1 else ''}, in the table")
+        console.print(f"and {counted(left, 'more reason')}, in the table")

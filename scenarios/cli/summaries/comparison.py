@@ -6,6 +6,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from handover.cosim.exceptions import counted
 from handover.scenarios.cli.console import heading, open_console
 from handover.scenarios.comparison.campaigns import (
     EVERY,
@@ -112,5 +113,4 @@ def _print_table(console: Console, header: Sequence[str], rows: Sequence[Sequenc
         table.add_row(*map(Text, row))
     console.print(table)
     if len(rows) > _MAX_ROWS:
-        more = len(rows) - _MAX_ROWS
-        console.print(f"  and {more} more {'row' if more == 1 else 'rows'}, in the report")
+        console.print(f"  and {counted(len(rows) - _MAX_ROWS, 'more row')}, in the report")

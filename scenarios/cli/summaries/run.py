@@ -9,7 +9,7 @@ from typing import NoReturn, TextIO
 
 import click
 
-from handover.cosim.exceptions import RecordNotWritten
+from handover.cosim.exceptions import RecordNotWritten, counted
 from handover.cosim.fmu.heartbeat import Heartbeat
 from handover.scenarios.cli.console import open_console, print_rows
 from handover.scenarios.execution.child_process import ChildEnd
@@ -64,7 +64,7 @@ def _print_place(folder: RunFolder) -> None:
 def _conversion_rows(folder: RunFolder) -> list[tuple[str, str]]:
     conversions = [format_conversion(c) for c in folder.read_run().get("conversions", [])]
     left = len(conversions) - _MAX_CONVERSIONS
-    more = [(f"{left} conversion{'s' if left > 1 else ''} more", "in the report")] if left > 0 else []
+    more = [(f"{counted(left, 'conversion')} more", "in the report")] if left > 0 else []
     return [(f"converted: {ends}", change) for ends, change in conversions[:_MAX_CONVERSIONS]] + more
 
 

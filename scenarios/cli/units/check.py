@@ -11,6 +11,7 @@ from rich.text import Text
 
 from handover.cosim.check.check_fmu import check_fmu
 from handover.cosim.check.report import EXPERIMENTS, CheckReport, Section
+from handover.cosim.exceptions import counted
 from handover.cosim.files import reading_fault
 from handover.cosim.fmu.file.archive import NO_FILE_FAULT
 from handover.cosim.probe.finding import Finding, Level
@@ -135,12 +136,12 @@ def _print_indented(mark: str, text: Text, width: int) -> None:
 
 
 def _verdict(report: CheckReport) -> Text:
-    counted = [
-        f"{n} {level.name.lower()}{'s' if n > 1 else ''}"
+    counts = [
+        counted(n, level.name.lower())
         for level in (Level.FAULT, Level.WARNING, Level.NOTE)
         if (n := report.count(level))
     ]
-    sentence = f" ({', '.join(counted)})" if counted else ""
+    sentence = f" ({', '.join(counts)})" if counts else ""
     if report.passed:
         return Text.assemble(("usable", "green"), f": no faults were found{sentence}")
     if {s.name for s in report.sections if s.level is Level.FAULT} == {EXPERIMENTS}:

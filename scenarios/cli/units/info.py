@@ -6,6 +6,7 @@ from typing import Any
 
 import click
 
+from handover.cosim.exceptions import counted
 from handover.cosim.fmu.file.archive import FmuArchive
 from handover.cosim.fmu.file.description import FmuDescription, FmuPort, describe_fmu
 from handover.cosim.fmu.file.fmpy_edge import platforms_in
@@ -18,7 +19,6 @@ from handover.scenarios.execution.errors import UsageError, one_line_errors
 from handover.scenarios.execution.fmu_run import is_fmu
 from handover.scenarios.execution.selection import folder_fault, nothing_at
 from handover.scenarios.execution.ssp_run import is_ssp
-from handover.scenarios.experiment.display_unit import counted
 
 _HELP = """Show what is in FILE, an FMU (2.0 or 3.0, co-simulation) or an SSP: names, steps, capabilities, parameters,
 inputs, outputs and terminals; of an SSP its units, parameters and connections. Nothing is loaded or run; `handover

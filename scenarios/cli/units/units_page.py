@@ -7,6 +7,7 @@ from markupsafe import Markup
 
 from handover.cosim.blocks.declarations import DeclarationError
 from handover.cosim.blocks.description import Description, describe
+from handover.cosim.exceptions import counted
 from handover.fmus.catalog import UNITS, Entry, UnknownBlock, find_unit, import_class, installed_units
 from handover.fmus.contents.documentation import seconds
 from handover.fmus.contents.icons import InvalidIcon, block_icon
@@ -65,21 +66,21 @@ def _html(
             step=seconds(entry.step) if entry else "",
             sampled=description is not None and description.period is not None,
             picture=picture,
-            contents=", ".join(f"{n} {title}" for title, n, _ in groups),
-            tables=[table for _, _, table in groups],
+            contents=", ".join(count for count, _ in groups),
+            tables=[table for _, table in groups],
             fault=fault,
         )
     )
 
 
-def _tables(d: Description) -> Sequence[tuple[str, int, Markup]]:
-    """Return what it is, the number of rows, and the table of each kind of variable that there is."""
-    found: list[tuple[str, int, Markup]] = []
-    for title, variables in (("inputs", d.inputs), ("outputs", d.outputs), ("parameters", d.parameters)):
+def _tables(d: Description) -> Sequence[tuple[str, Markup]]:
+    """Return how many there are, and the table, of each kind of variable that there is."""
+    found: list[tuple[str, Markup]] = []
+    for title, variables in (("input", d.inputs), ("output", d.outputs), ("parameter", d.parameters)):
         rows = port_rows(variables)
         shown = [k for k in range(len(_COLUMNS)) if any(row[k] for row in rows)]
         if rows:
             cells = [[row[k] for k in shown] for row in rows]
-            table = rows_table([_COLUMNS[k] for k in shown], cells, caption=title.capitalize(), cards=True)
-            found.append((title if len(rows) > 1 else title[:-1], len(rows), table))
+            table = rows_table([_COLUMNS[k] for k in shown], cells, caption=f"{title}s".capitalize(), cards=True)
+            found.append((counted(len(rows), title), table))
     return found

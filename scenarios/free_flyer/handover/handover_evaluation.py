@@ -7,9 +7,9 @@ import math
 from collections.abc import Mapping, Sequence
 
 from handover.controllers.free_flyer.handover_parameters import Params as DecisionParams
+from handover.cosim.exceptions import counted
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PlacedUnit
-from handover.scenarios.experiment.display_unit import counted
 from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
 from handover.scenarios.free_flyer.handover.led_hand import end_of_track
 from handover.scenarios.free_flyer.handover.person_evaluation import Cause, Miss, PersonsDeeds

@@ -9,11 +9,11 @@ from typing import ClassVar
 import numpy as np
 
 from handover.controllers.free_flyer.sampled_loop import largest_stable
+from handover.cosim.exceptions import counted
 from handover.cosim.stepping.options import Algorithm, MasterOptions
 from handover.plants.free_flyer.robot.thrusters import Params as ThrustersParams
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.experiment.display_unit import counted
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import COLOURS
 from handover.scenarios.free_flyer.parameters import Behaviour

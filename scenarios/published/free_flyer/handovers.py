@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from handover.cosim.blocks.ports import Floats
+from handover.cosim.exceptions import counted
 from handover.plants.free_flyer.robot.navigation import Params as NavigationParams
-from handover.scenarios.experiment.display_unit import counted
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.free_flyer.parameters import Behaviour, Task
 from handover.scenarios.published.runs import Count, Point, Runs, is_done

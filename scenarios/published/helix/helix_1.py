@@ -16,11 +16,11 @@ from scipy import stats
 from scipy.stats import page_trend_test, ttest_ind_from_stats
 
 from handover.cosim.blocks.ports import Floats
+from handover.cosim.exceptions import counted
 from handover.plants.helix.arm.tendon_parameters import Params as ArmParams
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.statistics import LEVEL, MIN_SAMPLES, RESAMPLES, Statistic, time_interval
 from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.experiment.display_unit import counted
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import COLOURS

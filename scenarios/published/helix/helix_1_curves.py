@@ -20,9 +20,9 @@ from handover.controllers.helix.servo.constant_curvature import W_FROM_B, forwar
 from handover.controllers.helix.servo.servo_parameters import Params as ServoParams
 from handover.controllers.helix.servo.visual_servo import Phase
 from handover.cosim.blocks.ports import Floats
+from handover.cosim.exceptions import counted
 from handover.cosim.record.reader import Record
 from handover.scenarios.campaign.statistics import LEVEL, MIN_SAMPLES, success_interval, time_interval
-from handover.scenarios.experiment.display_unit import counted
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import COLOURS

@@ -7,10 +7,10 @@ from typing import ClassVar
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
+from handover.cosim.exceptions import counted
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.statistics import LEVEL, paired_difference, paired_test
 from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.experiment.display_unit import counted
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import COLOURS
 from handover.scenarios.published.claims import Statement

@@ -12,9 +12,9 @@ from matplotlib.colors import ListedColormap
 
 from handover.controllers.helix.servo.servo_parameters import Params as ServoParams
 from handover.cosim.blocks.ports import Floats
+from handover.cosim.exceptions import counted
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.experiment.display_unit import counted
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import COLOURS
 from handover.scenarios.helix.workspace import cameras_that_see, reach

@@ -12,12 +12,12 @@ import numpy as np
 from handover.controllers.ir_grasp.ir_reflex import Phase
 from handover.controllers.ir_grasp.parameters import Params as ReflexParams
 from handover.cosim.blocks.ports import Floats
+from handover.cosim.exceptions import counted
 from handover.cosim.record.reader import Record
 from handover.plants.ir_grasp.objects import SOLIDS
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.statistics import success_interval
 from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.experiment.display_unit import counted
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.ir_grasp.evaluation import IN_COST
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp

@@ -9,10 +9,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from handover.cosim.exceptions import counted
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.statistics import LEVEL, success_interval, time_interval
 from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.experiment.display_unit import counted
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import COLOURS
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp

@@ -9,9 +9,9 @@ import numpy as np
 
 from handover.controllers.ir_grasp.parameters import Params as ReflexParams
 from handover.cosim.blocks.ports import Floats
+from handover.cosim.exceptions import counted
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.experiment.display_unit import counted
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import COLOURS
 from handover.scenarios.ir_grasp.ir_sensor import AT, Finger, IrSensor

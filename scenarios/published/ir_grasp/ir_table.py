@@ -12,6 +12,7 @@ import numpy as np
 
 from handover.controllers.ir_grasp.ir_reflex import Stop
 from handover.cosim.blocks.ports import Floats
+from handover.cosim.exceptions import counted
 from handover.plants.ir_grasp.objects import SOLIDS, Thing
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.statistics import (
@@ -22,7 +23,6 @@ from handover.scenarios.campaign.statistics import (
     two_proportions,
 )
 from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.experiment.display_unit import counted
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import COLOURS

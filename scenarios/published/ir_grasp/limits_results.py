@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from handover.cosim.exceptions import counted
 from handover.scenarios.campaign.statistics import LEVEL, holm, sign_flip_test
-from handover.scenarios.experiment.display_unit import counted
 from handover.scenarios.published.ir_grasp.limits_axes import AXES, Axis, LimitArm, settings_of
 from handover.scenarios.published.runs import Count, Row, Runs, is_done, plain
 

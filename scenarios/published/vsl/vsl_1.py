@@ -8,9 +8,9 @@ from typing import ClassVar
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
+from handover.cosim.exceptions import counted
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.experiment.display_unit import counted
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import COLOURS

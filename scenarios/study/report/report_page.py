@@ -6,7 +6,7 @@ from pathlib import Path
 
 from markupsafe import Markup
 
-from handover.scenarios.experiment.display_unit import counted
+from handover.cosim.exceptions import counted
 from handover.scenarios.reporting.html import rows_table
 from handover.scenarios.reporting.page import Section, template, write_page
 from handover.scenarios.study.folder.codebook import PILOT

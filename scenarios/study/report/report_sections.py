@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from markupsafe import Markup
 
-from handover.scenarios.experiment.display_unit import counted
+from handover.cosim.exceptions import counted
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.free_flyer.parameters import Behaviour, Task
 from handover.scenarios.published.free_flyer.handovers import STUDIED, published_failures

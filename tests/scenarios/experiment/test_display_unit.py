@@ -4,7 +4,8 @@ import math
 
 import pytest
 
-from handover.scenarios.experiment.display_unit import column_text, counted, digits_after_point, display_unit
+from handover.cosim.exceptions import counted
+from handover.scenarios.experiment.display_unit import column_text, digits_after_point, display_unit
 
 
 @pytest.mark.parametrize(
