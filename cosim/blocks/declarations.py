@@ -38,12 +38,7 @@ def declared_variables(owner: type[Any], causality: Causality, block: str = "") 
     hints = typing.get_type_hints(owner, include_extras=True)
     owner_name = f"{block}: {owner.__name__}" if block else owner.__name__
     fields = dataclasses.fields(owner)
-    variables = tuple(_variable(owner_name, f, f.metadata.get("type", hints[f.name]), causality) for f in fields)
-    known = {v.name for v in variables}
-    for v in variables:
-        if unknown := [name for need in v.needs for name in need.names if name not in known]:
-            raise DeclarationError(owner_name, v.name, f"it needs {', '.join(unknown)}, which is not a field beside it")
-    return variables
+    return tuple(_variable(owner_name, f, f.metadata.get("type", hints[f.name]), causality) for f in fields)
 
 
 def _variable(owner: str, field: "dataclasses.Field[Any]", hint: Any, causality: Causality) -> Variable:
@@ -62,7 +57,6 @@ def _variable(owner: str, field: "dataclasses.Field[Any]", hint: Any, causality:
         minimum=declaration.minimum,
         maximum=declaration.maximum,
         origin=declaration.origin,
-        needs=declaration.needs,
         **attributes,
     )
     fault = bounds_fault(variable) or ("" if causality is Causality.OUTPUT else start_fault(variable))

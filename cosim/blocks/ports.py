@@ -144,36 +144,6 @@ BLACK_1280X720 = np.zeros((720, 1280, 3), dtype=np.uint8)
 """Start value of a picture."""
 
 
-@dataclass(frozen=True)
-class Need:
-    """What others of a scenario's parameters must be for one to have an effect, see `any_of` and `being`.
-
-    Attributes:
-        names: of the parameters, one of which has to be so.
-        values: that it has one of; without any, all but 0, false and empty will do.
-    """
-
-    names: tuple[str, ...]
-    values: tuple[Any, ...] = ()
-
-    def is_met(self, parameters: Any) -> bool:
-        """Return whether one of the parameters is so."""
-        given = [getattr(parameters, name) for name in self.names]
-        if not self.values:
-            return any(np.any(value) if not isinstance(value, str) else value for value in given)
-        return any(np.array_equal(value, right) for value in given for right in self.values)
-
-
-def any_of(*names: str) -> Need:
-    """Return the need that one of these parameters is set to something: it is not 0, false, empty or the first item."""
-    return Need(names)
-
-
-def being(name: str, *values: Any) -> Need:
-    """Return the need that a parameter has one of these values."""
-    return Need((name,), values)
-
-
 @dataclass(frozen=True, kw_only=True)
 class Declaration:
     """What a field declares of its port beyond its type."""
@@ -183,7 +153,6 @@ class Declaration:
     minimum: float | None = None
     maximum: float | None = None
     origin: Origin | None = None
-    needs: tuple[Need, ...] = ()
 
 
 def parameter(
@@ -193,17 +162,12 @@ def parameter(
     minimum: float | None = None,
     maximum: float | None = None,
     origin: Origin | None = None,
-    needs: tuple[Need, ...] = (),
 ) -> T:
     """Declare a parameter, as the default of a dataclass field: its value is fixed during a run.
 
-    Bounds are inclusive and hold for every entry of an array. The origin says where the default comes from. A
-    scenario's parameter has an effect only where all that it needs is met; else another value than the default is
-    refused: `needs=(being("path", Path.CUSTOM),)`.
+    Bounds are inclusive and hold for every entry of an array. The origin says where the default comes from.
     """
-    d = Declaration(
-        description=description, start=default, minimum=minimum, maximum=maximum, origin=origin, needs=needs
-    )
+    d = Declaration(description=description, start=default, minimum=minimum, maximum=maximum, origin=origin)
     return declared_field(d)
 
 

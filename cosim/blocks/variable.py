@@ -8,7 +8,7 @@ import re
 from typing import Any
 
 from handover.cosim.blocks.origins import Origin
-from handover.cosim.blocks.ports import Need, Raster, Width
+from handover.cosim.blocks.ports import Raster, Width
 from handover.cosim.blocks.units import ONE, Unit
 
 SUBSCRIPT = re.compile(r"\[(\d{1,9}(?:,\d{1,9}){0,15})\]$")
@@ -87,7 +87,6 @@ class Variable(Declared):
 
     start: Any
     origin: Origin | None = None
-    needs: tuple[Need, ...] = ()
     enumeration: type[enum.IntEnum] | None = None
     raster: Raster | None = None
 

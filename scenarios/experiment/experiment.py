@@ -27,6 +27,7 @@ from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PlacedUnit, System
 from handover.scenarios.experiment.exposed import carry, check_exposed, with_exposed
 from handover.scenarios.experiment.live_inputs import HandHint, LedHand, Pushable
+from handover.scenarios.experiment.needs import needs_of
 from handover.scenarios.experiment.paper import PublishedValue
 from handover.scenarios.experiment.pictures import CameraPicture
 from handover.scenarios.experiment.places import Place, fit_places, presume_steps_of_places
@@ -241,6 +242,7 @@ class Experiment(abc.ABC, Generic[AnyEvaluator]):
         check_methods(cls, Experiment, _OF_SCENARIOS)
         if isinstance(build := vars(cls).get("build"), FunctionType):
             type.__setattr__(cls, "build", _carrying(build))
+        needs_of(cls.parameters_type)
         check_exposed(cls.parameters_type, getattr(cls, "units", ()))
         cls.places = with_exposed(cls.places, cls.parameters_type)
         if "name" not in vars(cls):

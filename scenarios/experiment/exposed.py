@@ -13,9 +13,10 @@ from typing import Any
 
 from handover.cosim.blocks.declarations import DeclarationError
 from handover.cosim.blocks.origins import Origin
-from handover.cosim.blocks.ports import Need, declared_field
+from handover.cosim.blocks.ports import declared_field
 from handover.cosim.exceptions import nearest
 from handover.cosim.system.system import System
+from handover.scenarios.experiment.needs import Need
 from handover.scenarios.experiment.places import Place
 
 _BY_SCENARIO = "the scenario's parameter"
@@ -52,12 +53,12 @@ def expose(
     if "declaration" not in metadata:
         raise DeclarationError(params.__name__, name, "it cannot be exposed, as it is not declared")
     own = {"origin": origin, "minimum": minimum, "maximum": maximum, "description": description or None, "start": start}
-    own["needs"] = needs or None
     declaration = replace(metadata["declaration"], **{k: v for k, v in own.items() if v is not None})
     hint = metadata.get("type", _hints(params)[name])
     own_paths = tuple(path for path in paths if "." in path)
     exposes = own_paths or metadata.get("exposes", ())
-    return declared_field(declaration, type=hint, exposes=exposes, of_units=bool(own_paths))
+    needs = needs or metadata.get("needs", ())
+    return declared_field(declaration, type=hint, exposes=exposes, of_units=bool(own_paths), needs=needs)
 
 
 @functools.cache

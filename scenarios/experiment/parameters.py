@@ -6,11 +6,11 @@ from typing import Any, cast
 import numpy as np
 
 from handover.cosim.blocks.declarations import short_repr
-from handover.cosim.blocks.ports import Need
 from handover.cosim.blocks.start_values import fault_of, range_of
 from handover.cosim.blocks.variable import Kind, Variable
 from handover.cosim.exceptions import MOST_FAULTS, counted, first_faults, nearest, suggestion
 from handover.scenarios.experiment.experiment import Experiment
+from handover.scenarios.experiment.needs import Need, needs_of
 
 
 class UnknownParameter(str):
@@ -94,10 +94,10 @@ def idle_parameters(experiment: type[Experiment[Any]], parameters: Any) -> dict[
     """Return the parameters that are not at their defaults though nothing comes of them, with what each needs."""
     variables = {v.name: v for v in experiment.parameters()}
     found: dict[str, str] = {}
-    for v in variables.values():
-        lacking = [need for need in v.needs if not need.is_met(parameters)]
-        if lacking and text_of(v, getattr(parameters, v.name)) != text_of(v, v.start):
-            found[v.name] = " and ".join(_needed(need, variables) for need in lacking)
+    for name, needs in needs_of(parameters).items():
+        v, lacking = variables[name], [need for need in needs if not need.is_met(parameters)]
+        if lacking and text_of(v, getattr(parameters, name)) != text_of(v, v.start):
+            found[name] = " and ".join(_needed(need, variables) for need in lacking)
     return found
 
 
@@ -117,10 +117,13 @@ def idle_fault(name: str, needed: str) -> str:
 
 
 def _needed(need: Need, variables: Mapping[str, Variable]) -> str:
-    v = variables[need.names[0]]
-    texts = [text_of(v, value) for value in need.values] or [item.lower() for item, number in v.items if number]
+    return " or ".join(_condition(variables[name], need.values) for name in need.names)
+
+
+def _condition(v: Variable, values: Sequence[Any]) -> str:
+    texts = [text_of(v, value) for value in values] or [item.lower() for item, number in v.items if number]
     if not texts:
-        return f"{' or '.join(need.names)} is set"
+        return f"{v.name} is set"
     return f"{v.name}={' or '.join(texts)}" if all(texts) else f"{v.name} is empty"
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from handover.controllers.free_flyer.handover_parameters import Params as DecisionParams
 from handover.controllers.free_flyer.handover_team import Params as TeamDecisionParams
 from handover.cosim.blocks.origins import Origin, assumed, derived, stated
-from handover.cosim.blocks.ports import Floats, any_of, being, parameter
+from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.units import Newton, NewtonMetre, Number, Second
 from handover.plants.free_flyer.hand.parameters import Params as PersonParams
 from handover.plants.free_flyer.large_object.parameters import Params as LargeObjectParams
@@ -19,6 +19,7 @@ from handover.plants.free_flyer.robot.navigation import Params as NavigationPara
 from handover.plants.free_flyer.robot.push import Params as PushParams
 from handover.plants.free_flyer.robot.thrusters import Params as ThrustersParams
 from handover.scenarios.experiment.exposed import expose
+from handover.scenarios.experiment.needs import any_of, being, parameter
 from handover.scenarios.experiment.paper import paper_values
 
 ROBOTS = ("1", "2")

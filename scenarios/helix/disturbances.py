@@ -12,12 +12,13 @@ import numpy as np
 
 from handover.controllers.helix.servo.servo_parameters import Params as ServoParams
 from handover.cosim.blocks.origins import assumed, derived
-from handover.cosim.blocks.ports import Floats, any_of, parameter
+from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.units import Metre, Number, Pixel, Radian, Second
 from handover.plants.helix.arm.tendon_parameters import Params as ArmParams
 from handover.plants.helix.cameras.camera_parameters import Params as CameraParams
 from handover.plants.helix.hand.partner_parameters import Params as HandParams
 from handover.scenarios.experiment.exposed import expose
+from handover.scenarios.experiment.needs import any_of, parameter
 
 
 class Cover(enum.IntEnum):

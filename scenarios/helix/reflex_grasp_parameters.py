@@ -6,10 +6,10 @@ from typing import Any
 
 from handover.controllers.helix.reflex.grasp_reflex import Params as ReflexParams
 from handover.cosim.blocks.origins import assumed
-from handover.cosim.blocks.ports import any_of, being, parameter
 from handover.cosim.blocks.units import Metre
 from handover.plants.helix.finger_infrared import Params as FingerParams
 from handover.scenarios.experiment.exposed import expose
+from handover.scenarios.experiment.needs import any_of, being, parameter
 from handover.scenarios.helix.parameters import Parameters
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from handover.controllers.ir_grasp.parameters import Correction, Strategy
 from handover.controllers.ir_grasp.parameters import Params as Reflex
 from handover.cosim.blocks.origins import assumed, stated
-from handover.cosim.blocks.ports import Floats, Vector2, any_of, being, parameter
+from handover.cosim.blocks.ports import Floats, Vector2
 from handover.cosim.blocks.units import Metre, MetrePerSecond, Radian
 from handover.cosim.record.reader import Record
 from handover.plants.ir_grasp.hand import PALM
@@ -21,6 +21,7 @@ from handover.plants.ir_grasp.objects import Solid, Thing, placed, polygon_corne
 from handover.plants.ir_grasp.parameters import Params as Scene
 from handover.plants.ir_grasp.shapes import polygon_faults
 from handover.scenarios.experiment.exposed import expose
+from handover.scenarios.experiment.needs import any_of, being, parameter
 
 _DRAWN_SHIFT = (being("perturbed", True), being("shift", np.zeros(2)), being("turn", 0.0))
 _OWN_TEST = assumed("a test of our own; not in the paper")

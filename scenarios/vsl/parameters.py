@@ -16,12 +16,13 @@ from handover.controllers.vsl.trajectory_planner import Elbow, Path, segments_by
 from handover.controllers.vsl.trajectory_planner import Params as Planner
 from handover.controllers.vsl.waypoints import InvalidWaypoints
 from handover.cosim.blocks.origins import assumed, stated
-from handover.cosim.blocks.ports import Floats, any_of, being, parameter
+from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.schedule import InvalidSchedule, Schedule
 from handover.cosim.blocks.units import Kilogram, Metre, Number, Pascal
 from handover.plants.vsl.parameters import MAX_PRESSURE, Link, Motion
 from handover.plants.vsl.parameters import Params as ArmParams
 from handover.scenarios.experiment.exposed import expose
+from handover.scenarios.experiment.needs import any_of, being, parameter
 
 _ONE_ARM = assumed("one arm was built; others are of one's own")
 

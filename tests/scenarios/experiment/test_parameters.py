@@ -1,10 +1,17 @@
-from typing import Any
+import enum
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 from support.wording import Wording
 
+from handover.cosim.blocks.declarations import DeclarationError, declared_variables
+from handover.cosim.blocks.units import Metre
+from handover.cosim.blocks.variable import Causality
 from handover.scenarios.catalog import SCENARIOS, named_scenario
 from handover.scenarios.experiment.experiment import Experiment
+from handover.scenarios.experiment.needs import any_of, needs_of, parameter
 from handover.scenarios.experiment.parameters import (
     InvalidParameter,
     check_effects,
@@ -84,6 +91,34 @@ def test_what_nothing_comes_of_is_refused_until_what_it_needs_is_set(
     wording.check(caught.value)
     cured = {text.partition("=")[0]: text for text in (*idle, *given, *cure)}
     check_effects(kind, parse_parameters(kind, [*cured.values()]))
+
+
+class _Kind(enum.IntEnum):
+    PLAIN = 0
+    ROUND = 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Parameters:
+    kind: _Kind = parameter(_Kind.PLAIN, "its kind")
+    speed: Metre = parameter(0.0, "its speed")
+    late: Metre = parameter(0.0, "its delay", needs=(any_of("speed", "kind"),))
+
+
+def test_what_would_do_is_said_of_each_parameter_that_is_needed_of_some():
+    kind = cast(Any, SimpleNamespace(parameters=lambda: declared_variables(_Parameters, Causality.PARAMETER)))
+    assert idle_parameters(kind, _Parameters(late=1.0)) == {"late": "speed is set or kind=round"}
+    assert not idle_parameters(kind, _Parameters(late=1.0, kind=_Kind.ROUND))
+
+
+def test_what_needs_a_parameter_that_is_not_beside_it_is_refused():
+    @dataclass(frozen=True, kw_only=True)
+    class Parameters:
+        late: Metre = parameter(0.0, "its delay", needs=(any_of("sped"),))
+
+    with pytest.raises(DeclarationError) as e:
+        needs_of(Parameters)
+    assert (e.value.owner, e.value.field) == ("Parameters", "late")
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
