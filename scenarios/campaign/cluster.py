@@ -17,11 +17,11 @@ from distributed import Client, Future, KilledWorker
 from handover.cosim.exceptions import one_line
 from handover.cosim.fmu.heartbeat import PolledClock
 from handover.scenarios.campaign.worker import (
-    difference,
     end_runs,
     fault_of_folder,
-    package_versions,
+    fault_of_versions,
     run_job_on_worker,
+    worker_versions,
 )
 from handover.scenarios.campaign.worker_pool import JobResult, RunJob, marked
 from handover.scenarios.execution.errors import ClusterLost, PoolError
@@ -110,8 +110,8 @@ class ClusterPool:
             PoolError: some do not; the first of them are named.
             RecordNotWritten: this process cannot write there itself.
         """
-        found = self._ask(package_versions)
-        self._raise_faults({worker: _difference(self._versions, other) for worker, other in found.items()})
+        found = self._ask(worker_versions)
+        self._raise_faults({worker: _fault_of_answer(self._versions, other) for worker, other in found.items()})
         with marked(folder) as mark:
             faults = self._ask(fault_of_folder, str(folder.absolute()), mark, mark)
         self._raise_faults(
@@ -199,10 +199,10 @@ class ClusterPool:
             raise PoolError(f"{self._name} cannot be used: {'; '.join(bad[:_MAX_REPORTED])}{more}")
 
 
-def _difference(here: Mapping[str, str], there: Any) -> str:
+def _fault_of_answer(here: Mapping[str, str], there: Any) -> str:
     if isinstance(there, BaseException):
         return f"cannot run this package: {type(there).__name__}: {one_line(there)}"
-    return difference(here, there)
+    return fault_of_versions(here, there)
 
 
 @contextlib.contextmanager

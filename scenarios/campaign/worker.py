@@ -31,8 +31,8 @@ def run_job_on_worker(job: RunJob, batch: str, wanted_versions: Mapping[str, str
     A worker that joined after the others were checked may be of other versions; it runs nothing.
     """
     worker = get_worker()
-    if other := difference(wanted_versions, _versions()):
-        return JobResult(name=job.name, lost=f"worker {worker.address} {other}")
+    if fault := fault_of_versions(wanted_versions, worker_versions()):
+        return JobResult(name=job.name, lost=f"worker {worker.address} {fault}")
     task = worker.get_current_task()
 
     def wanted() -> bool:
@@ -56,15 +56,13 @@ def end_runs(batch: str) -> None:
         runner.end()
 
 
-def package_versions() -> dict[str, str]:
-    """Return the versions of the packages on which a run's numbers depend."""
-    return _versions()
+@functools.cache
+def worker_versions() -> dict[str, str]:
+    """Return the versions of the packages on which a run's numbers depend, those when this worker was first asked."""
+    return versions()
 
 
-_versions = functools.cache(versions)
-
-
-def difference(here: Mapping[str, str], there: Mapping[str, str]) -> str:
+def fault_of_versions(here: Mapping[str, str], there: Mapping[str, str]) -> str:
     """Return which versions of a worker differ, as a predicate; "" if none does."""
     other = version_differences(here, there)
     return f"has other versions: {other}" if other else ""

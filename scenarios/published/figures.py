@@ -1,6 +1,6 @@
 """Figures of a published experiment, declared as panels of marks, and the kinds that several experiments have."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Protocol
@@ -69,22 +69,27 @@ class Mark:
         axes.plot(self.x, self.y, *form, **{**usual, **self.style})
 
 
-def level(value: float, colour: str = SOFT, label: str = "", *, upright: bool = False, **style: Any) -> "Line":
-    """Return a line across the panel, dashed unless a style says otherwise."""
-    return Line(value, upright, {"color": colour, "label": label or None, "ls": DASHED, "lw": 1.0, **style})
+def level(y: float, colour: str = SOFT, label: str = "", **style: Any) -> "Line":
+    """Return a level line across the panel, dashed unless a style says otherwise."""
+    return Line(Axes.axhline, y, {"color": colour, "label": label or None, "ls": DASHED, "lw": 1.0, **style})
+
+
+def upright(x: float, colour: str = SOFT, label: str = "", **style: Any) -> "Line":
+    """Return an upright line across the panel, dashed unless a style says otherwise."""
+    return replace(level(x, colour, label, **style), method=Axes.axvline)
 
 
 @dataclass(frozen=True)
 class Line:
-    """A line across a panel, level or upright."""
+    """A line across a panel, by the method of matplotlib that draws it at a value."""
 
+    method: Callable[..., Any]
     value: float
-    upright: bool
     style: Mapping[str, Any]
 
     def draw(self, axes: Axes) -> None:
         """Draw it."""
-        (axes.axvline if self.upright else axes.axhline)(self.value, **self.style)
+        self.method(axes, self.value, **self.style)
 
 
 @dataclass(frozen=True)
@@ -102,23 +107,34 @@ class Bars:
         axes.bar(x, y, width=self.width, color=self.colour, label=self.label)
 
 
+_GREY = {"color": "#d5dae2", "lw": 0, "zorder": 0}
+
+
 @dataclass(frozen=True)
 class Spans:
-    """Grey spans of published values: places, least and greatest; level ones go across the panel if of no width."""
+    """Grey spans of published values, upright: places, least and greatest."""
 
     spans: Sequence[tuple[float, float, float]]
     width: float
     label: str
-    upright: bool = True
 
     def draw(self, axes: Axes) -> None:
         """Draw them."""
-        for k, (x, low, high) in enumerate(self.spans):
-            style: dict[str, Any] = {"color": "#d5dae2", "lw": 0, "zorder": 0, "label": None if k else self.label}
-            if self.upright:
-                axes.bar(x, high - low, self.width, bottom=low, **style)
-            else:
-                axes.axvspan(low, high, **style)
+        x, low, high = np.reshape(self.spans, (-1, 3)).T
+        axes.bar(x, high - low, self.width, bottom=low, label=self.label, **_GREY)
+
+
+@dataclass(frozen=True)
+class Band:
+    """A grey band of published values from the least to the greatest x, as high as the panel."""
+
+    low: float
+    high: float
+    label: str
+
+    def draw(self, axes: Axes) -> None:
+        """Draw it."""
+        axes.axvspan(self.low, self.high, label=self.label, **_GREY)
 
 
 @dataclass(frozen=True)

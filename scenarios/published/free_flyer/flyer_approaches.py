@@ -16,7 +16,7 @@ from handover.scenarios.experiment.plotting import COLOURS
 from handover.scenarios.free_flyer.handover.handovers import HandoverOfTask
 from handover.scenarios.free_flyer.parameters import Behaviour
 from handover.scenarios.published.claims import Statement
-from handover.scenarios.published.figures import Mark, Panel, drawn, level, strip
+from handover.scenarios.published.figures import Mark, Panel, drawn, strip, upright
 from handover.scenarios.published.free_flyer.handovers import (
     GIVING,
     RECEIVING,
@@ -178,7 +178,7 @@ def _row(label: str, exchange: Exchange, behaviour: Behaviour, runs: Runs) -> di
 
 def _panel(runs: Runs, exchange: Exchange, shown: dict[str, Variation]) -> Panel:
     marks = [Mark(label="threshold", style={"ls": "--"})]
-    lines = [level(exchange.threshold(b), COLOURS[b], upright=True) for b in Behaviour]
+    lines = [upright(exchange.threshold(b), COLOURS[b]) for b in Behaviour]
     for b in Behaviour:
         marks.append(Mark(form="|", colour=COLOURS[b], label=b.item, style={"ms": 8}))
         for k, case in enumerate(shown.values()):

@@ -27,7 +27,7 @@ from handover.scenarios.experiment.plotting import COLOURS
 from handover.scenarios.helix.evaluation import FIG_9_RESOLUTION
 from handover.scenarios.helix.parameters import HandPlace, Tuning, settings_of
 from handover.scenarios.published.claims import Statement
-from handover.scenarios.published.figures import SOFT, Drawable, Mark, Panel, Spans, drawn, level, strips
+from handover.scenarios.published.figures import SOFT, Band, Drawable, Mark, Panel, Spans, drawn, strips, upright
 from handover.scenarios.published.helix.helix_1_curves import (
     curve_claims,
     curves_of,
@@ -663,8 +663,8 @@ def _draw_spread(found: Mapping[Case, Runs], folder: Path) -> list[Figure]:
         bar = [Mark([np.median(times)] * 2, [-0.3, 0.3], "-", COLOURS[0], style={"lw": 2.0})] if len(times) else []
         cases[case.label] = [*marks, *bar]
     key: list[Drawable] = [
-        Spans([(0.0, low, high)], 0.0, "published: shortest to longest", upright=False),
-        level(median, SOFT, "published: median", upright=True),
+        Band(low, high, "published: shortest to longest"),
+        upright(median, SOFT, "published: median"),
     ]
     caption = (
         "Times at the step size 0.1 with one disturbance at a time, with the thesis's settings, beside those that the "

@@ -28,7 +28,7 @@ from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import COLOURS
 from handover.scenarios.helix.evaluation import FIG_9_RESOLUTION
 from handover.scenarios.published.claims import Statement
-from handover.scenarios.published.figures import SOFT, Drawable, Mark, Panel, Spans, drawn, level, records_of
+from handover.scenarios.published.figures import SOFT, Band, Drawable, Mark, Panel, drawn, level, records_of, upright
 from handover.scenarios.published.published_experiment import Claim
 from handover.scenarios.published.runs import Row, Runs
 from handover.scenarios.published.verdicts import MIN_FOR_EVERY, format_p_value, format_rate
@@ -465,8 +465,8 @@ def draw_single_errors(
             low, high = _PRINTED["arm_time_min"][i], _PRINTED["arm_time_max"][i]
             longest = max(float(found.metric("arm_time").max()), high)
             marks: list[Drawable] = [
-                Spans([(0.0, low, high)], 0.0, "published: when the runs ended", upright=False),
-                level(_PRINTED["arm_time_median"][i], SOFT, "published: median of the times", upright=True),
+                Band(low, high, "published: when the runs ended"),
+                upright(_PRINTED["arm_time_median"][i], SOFT, "published: median of the times"),
                 *error_marks(errors, found.rows[0]["control_period"], COLOURS[i], ""),
                 Mark(label="mean of our runs, with deviation", style={"lw": 2.0}),
                 Mark(label="our runs", style={"lw": 0.6}),

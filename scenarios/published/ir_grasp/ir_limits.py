@@ -117,7 +117,7 @@ class IrLimits(PublishedExperiment):
             table_of(
                 "Where a way falls below one half",
                 [
-                    {"axis": axis.title, "range": _span(axis), **{arm.title: runs.half(arm, axis) for arm in ARMS}}
+                    {"axis": axis.title, "range": _range(axis), **{arm.title: runs.half(arm, axis) for arm in ARMS}}
                     for axis in _shown(runs)
                 ],
                 "Interpolated between levels. From the start: less than half is held without any disturbance, though "
@@ -297,7 +297,7 @@ def _unpushed(runs: LimitRuns) -> str:
     return "" if runs.pushed_most == math.inf else most
 
 
-def _span(axis: Axis) -> str:
+def _range(axis: Axis) -> str:
     first, last = axis.all_levels[0], axis.all_levels[-1]
     return f"{axis.format_number(first)} to {axis.format_level(last)}"
 

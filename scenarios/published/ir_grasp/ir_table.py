@@ -32,7 +32,7 @@ from handover.scenarios.published.claims import Statement
 from handover.scenarios.published.figures import Mark, Panel, drawn
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment
 from handover.scenarios.published.runs import Count, Point, Row, Runs
-from handover.scenarios.published.tables import number, table_of, with_interval
+from handover.scenarios.published.tables import number, span, table_of, with_interval
 from handover.scenarios.published.verdicts import (
     format_median,
     format_p_value,
@@ -322,9 +322,9 @@ def _of_fingers(runs: IrTableRuns, fingers: Sequence[str], perturbed: bool, why_
     theirs = [runs.published_distances(name, perturbed)[finger] for name, finger in cells]
     ours = [runs.distance(finger, perturbed, name) for name, finger in cells]
     who = f"the {fingers[0]} ends" if len(fingers) == 1 else f"{' and '.join(fingers)} end"
-    sentence = f"In {POSES[perturbed]} poses {who} {_span(theirs)} from the object."
-    says, medians = Statement(sentence, "table II", _span(theirs)), [float(np.median(x)) for x in ours if len(x)]
-    measured = f"{_span(medians)} (medians by object)" if medians else ""
+    sentence = f"In {POSES[perturbed]} poses {who} {_in_mm(theirs)} from the object."
+    says, medians = Statement(sentence, "table II", _in_mm(theirs)), [float(np.median(x)) for x in ours if len(x)]
+    measured = f"{_in_mm(medians)} (medians by object)" if medians else ""
     if why_open:
         return says.not_comparable(measured, why_open)
     if min(map(len, ours)) < _MIN_RUNS:
@@ -347,7 +347,7 @@ def _centred(runs: IrTableRuns) -> Claim:
     unlike = np.concatenate([np.abs(np.subtract(*runs.together(_IN_COST, p))) for p in POSES])
     unlike = unlike[np.isfinite(unlike)]  # of the runs in which both see the object
     says = Statement(
-        "Thumb and ring are well centred with respect to the object.", "table II, sec. V-D", f"{_span(printed)} apart"
+        "Thumb and ring are well centred with respect to the object.", "table II, sec. V-D", f"{_in_mm(printed)} apart"
     )
     interval = time_interval(unlike)
     if interval is None:
@@ -372,8 +372,8 @@ def _index_further(runs: IrTableRuns) -> Claim:
     return says.not_comparable(measured, _IN_SPACE, success_interval(*count) if further else None)
 
 
-def _span(values: Sequence[float]) -> str:
-    return f"{1000 * min(values):.0f} to {1000 * max(values):.0f} mm"
+def _in_mm(values: Sequence[float]) -> str:
+    return f"{span(1000 * np.asarray(values), '.0f')} mm"
 
 
 def _successes(runs: IrTableRuns, perturbed: bool) -> ComparisonTable:
