@@ -7,7 +7,7 @@ from pathlib import Path
 from types import TracebackType
 
 from handover.cosim.exceptions import one_line
-from handover.scenarios.campaign.run_servers import JobRunner
+from handover.scenarios.campaign.run_servers import JobRunner, end_runners
 from handover.scenarios.campaign.worker_pool import JobResult, RunJob, cores, marked
 
 
@@ -82,7 +82,4 @@ class LocalPool:
     def _end(self) -> None:
         """End the run servers, and their runs; later jobs get others."""
         ended, self._runners = self._runners, [JobRunner() for _ in range(self.workers)]
-        for runner in ended:
-            runner.ask_to_end()
-        for runner in ended:
-            runner.end()
+        end_runners(ended)

@@ -6,8 +6,9 @@ import shutil
 import subprocess
 import tempfile
 import threading
+import time
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO, cast
 
@@ -96,15 +97,16 @@ class ServerProcess:
         with contextlib.suppress(OSError, ValueError):
             self._jobs.close()
 
-    def end(self) -> None:
-        """End it, and its run, which leaves nothing."""
+    def end(self, deadline: float | None = None) -> None:
+        """End it, and its run, which leaves nothing; it is killed at a deadline, by default in 5 s."""
         self.ask_to_end()
+        deadline = time.monotonic() + _GRACE if deadline is None else deadline
         try:
-            self._process.wait(_GRACE)
+            self._process.wait(max(0.0, deadline - time.monotonic()))
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
-        self._listening.join(_GRACE)  # its run ends after it, and writes until then
+        self._listening.join(max(0.0, deadline + _GRACE - time.monotonic()))  # its run ends after it, and writes
 
     @property
     def _jobs(self) -> BinaryIO:
@@ -164,11 +166,11 @@ class JobRunner:
         if self._server is not None:
             self._server.ask_to_end()
 
-    def end(self) -> None:
-        """End the server, and its run, which leaves nothing."""
+    def end(self, deadline: float) -> None:
+        """End the server, and its run, which leaves nothing, by a deadline."""
         self.ask_to_end()
         if self._server is not None:
-            self._server.end()
+            self._server.end(deadline)
 
     def _running_server(self) -> ServerProcess:
         with self._lock:
@@ -177,3 +179,12 @@ class JobRunner:
             if self._server is None or not self._server.lives:
                 self._server = ServerProcess()
             return self._server
+
+
+def end_runners(runners: Sequence[JobRunner]) -> None:
+    """End servers and their runs together: all of them have the time that one has."""
+    for runner in runners:
+        runner.ask_to_end()
+    deadline = time.monotonic() + _GRACE
+    for runner in runners:
+        runner.end(deadline)

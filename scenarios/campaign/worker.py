@@ -12,7 +12,7 @@ from pathlib import Path
 
 from distributed import get_worker
 
-from handover.scenarios.campaign.run_servers import JobRunner
+from handover.scenarios.campaign.run_servers import JobRunner, end_runners
 from handover.scenarios.campaign.worker_pool import JobResult, RunJob
 from handover.scenarios.results.run_folder import version_differences, versions
 
@@ -39,9 +39,10 @@ def run_job_on_worker(job: RunJob, batch: str, wanted_versions: Mapping[str, str
         known = worker.state.tasks.get(task)
         return batch not in _ended and known is not None and known.state in ("executing", "long-running")
 
+    runner = JobRunner()
     with _lock:
-        runner = _runners.setdefault((batch, threading.get_ident()), JobRunner())
-    # jobs that waited here still come until the scheduler has cancelled them
+        if batch not in _ended:  # jobs that waited here still come until the scheduler has cancelled them
+            runner = _runners.setdefault((batch, threading.get_ident()), runner)
     return runner.run(job, wanted)
 
 
@@ -50,10 +51,7 @@ def end_runs(batch: str) -> None:
     with _lock:
         _ended.add(batch)
         runners = [_runners.pop(key) for key in list(_runners) if key[0] == batch]
-    for runner in runners:
-        runner.ask_to_end()
-    for runner in runners:
-        runner.end()
+    end_runners(runners)
 
 
 @functools.cache

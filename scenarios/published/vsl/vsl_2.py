@@ -188,8 +188,8 @@ class Vsl2(PublishedExperiment):
         own = [(_ESTIMATES.format(f"{CUBIC} that ship, while the tip goes by rigid kinematics"),
                 runs.estimates(MODEL_BASED))]  # fmt: skip
         own += [
-            (f"By {hybrid} the soft arm's tip has less error than that of a rigid arm with joints {factor:g} times as "
-             "stiff as assumed.", runs.compared(hybrid, label))
+            (f"By {hybrid} the soft arm's tip has less error than that of a rigid arm with joints "
+             f"{'' if factor == 1.0 else f'{factor:g} times '}as stiff as assumed.", runs.compared(hybrid, label))
             for factor, label in runs.joints.items()
         ]  # fmt: skip
         for method in runs.learned if runs.arms else ():

@@ -3,8 +3,10 @@
 import io
 import subprocess
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
+from typing import Any, cast
 
 import pytest
 from support.cosim.planted import planted_pickle
@@ -12,7 +14,8 @@ from support.scenarios.sample_jobs import quick_job
 
 from handover.cosim.blocks.block import InvalidState
 from handover.cosim.stepping.options import AdaptiveStep, Algorithm, Extrapolation, MasterOptions
-from handover.scenarios.campaign.run_servers import ServerLost, ServerProcess
+from handover.scenarios.campaign import run_servers
+from handover.scenarios.campaign.run_servers import ServerLost, ServerProcess, end_runners
 from handover.scenarios.campaign.worker_pool import JobResult, read_message, write_message
 
 
@@ -59,17 +62,28 @@ def test_a_run_server_ends_at_a_pickle(tmp_path: Path):
     assert not mark.exists()
 
 
+def server_of(program: str, monkeypatch: pytest.MonkeyPatch) -> ServerProcess:
+    def command(_module: str) -> list[str]:
+        return [sys.executable, "-S", "-c", program]
+
+    monkeypatch.setattr(run_servers, "module_command", command)
+    return ServerProcess()
+
+
 def test_a_worker_ends_a_server_that_answers_a_pickle(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     planted, mark = planted_pickle(tmp_path)
     answer = f"import sys; sys.stdin.buffer.read(8); sys.stdout.buffer.write({sent(planted).getvalue()!r})"
-    start = subprocess.Popen
-
-    def start_other(_command: list[str], **options: object) -> "subprocess.Popen[bytes]":
-        return start([sys.executable, "-c", answer], **options)  # type: ignore
-
-    monkeypatch.setattr(subprocess, "Popen", start_other)
-    server = ServerProcess()
+    server = server_of(answer, monkeypatch)
     with pytest.raises(ServerLost):
         server.run_job(quick_job(tmp_path), lambda: True)
     assert not server.lives
     assert not mark.exists()
+
+
+def test_servers_that_do_not_end_are_killed_after_the_time_that_one_has(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(run_servers, "_GRACE", 0.5)
+    servers = [server_of("import time; time.sleep(60)", monkeypatch) for _ in range(8)]
+    before = time.monotonic()
+    end_runners(cast(Any, servers))
+    assert time.monotonic() - before < 0.5 * len(servers)
+    assert not any(server.lives for server in servers)

@@ -1,6 +1,8 @@
 """A worker of a cluster executes only jobs whose results are still wanted."""
 
+import gc
 import logging
+import weakref
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -12,23 +14,30 @@ from support.scenarios.sample_jobs import job, quick_job
 
 from handover.scenarios.campaign import run_servers, worker
 from handover.scenarios.campaign.run_job import run_job
-from handover.scenarios.campaign.run_servers import ServerProcess
+from handover.scenarios.campaign.run_servers import JobRunner, ServerProcess
 from handover.scenarios.results.run_folder import versions
 
 
 def test_a_job_of_a_batch_that_has_been_ended_starts_no_server(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """The scheduler cancels jobs later than the worker is asked to end them."""
     started: list[ServerProcess] = []
+    runners: list[weakref.ref[JobRunner]] = []
 
     def started_server() -> ServerProcess:
         started.append(ServerProcess())
         return started[-1]
+
+    def noted_runner() -> JobRunner:
+        runner = JobRunner()
+        runners.append(weakref.ref(runner))
+        return runner
 
     def lost(client: Client, batch: str) -> str:
         arguments: list[Any] = [quick_job(tmp_path / "runs"), batch, versions()]
         return client.submit(worker.run_job_on_worker, *arguments, pure=False).result(timeout=60).lost
 
     monkeypatch.setattr(run_servers, "ServerProcess", started_server)
+    monkeypatch.setattr(worker, "JobRunner", noted_runner)
     with Client(processes=False, n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0") as client:
         client.run(worker.end_runs, "ended")
         assert lost(client, "ended") == "it was ended, as nobody waited for it"
@@ -39,6 +48,8 @@ def test_a_job_of_a_batch_that_has_been_ended_starts_no_server(tmp_path: Path, m
         assert lost(client, "wanted") == "it was ended, as nobody waited for it"
         assert len(started) == 1
     assert [p.name for p in (tmp_path / "runs").iterdir()] == ["run"]
+    gc.collect()
+    assert (len(runners), [r for r in runners if r() is not None]) == (3, [])  # none is kept of a batch that has ended
 
 
 def test_units_of_ours_tell_of_their_calls_and_a_campaigns_runs_in_their_logs(

@@ -93,6 +93,7 @@ def test_the_claim_against_the_rigid_arm_gets_no_verdict_and_is_told_where_it_fa
     claims = claims_of(table_of())
     assert claims[AGAINST_RIGID].verdict is Verdict.NOT_COMPARABLE
     assert "depends on that" in claims[AGAINST_RIGID].reason
+    assert STIFFER.format(NETWORK, 1).replace("1 times ", "") in claims
     verdicts = [claims[STIFFER.format(NETWORK, factor)].verdict_text for factor in [*JOINTS][1:]]
     assert verdicts == ["holds", "does not hold", "does not hold"]
     hangs = next(t for t in Vsl2().tables(table_of()) if t.title.startswith("What the claim"))
