@@ -7,7 +7,7 @@ takes from declarations, docstrings and results of runs, too.
 import html
 import re
 
-MOST_WORDS = 40
+MOST_WORDS = 32
 
 _TEXT = re.compile(r"<(p|figcaption)\b[^>]*>(.*?)</\1>", re.DOTALL)
 _NO_WORDS = re.compile(r"<(code|math|svg)\b.*?</\1>", re.DOTALL)

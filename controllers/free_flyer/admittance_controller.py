@@ -126,7 +126,7 @@ class AdmittanceController(GripperController[Inputs, Outputs]):
 
     - The wrench is estimated (`WrenchObserver`) from the navigation's velocities and the controller's own commands,
       which the propulsion is expected to follow with `delay` and `lag` (`ThrustModel`). Limits are known, since
-      commands are clipped to them, axis by axis; thrust that is otherwise lost counts as a wrench from outside, and so
+      commands are clipped to them, axis by axis. Thrust that is otherwise lost counts as a wrench from outside, and so
       does what a wrong mass makes of an acceleration.
     - With x_v the virtual body's displacement from the goal, k_M x_v'' + k_B x_v' + k_D x_v = F (`VirtualBody`): k_D
       and k_B of table 4.1 by behaviour, k_M = inertia_ratio times the robot's mass and inertia. The gripper's
@@ -138,8 +138,8 @@ class AdmittanceController(GripperController[Inputs, Outputs]):
 
     On activation, and where the goal changes, the virtual body is at the gripper and moves with it.
 
-    At construction the loop near the goal, with observer, virtual body and the model of the propulsion, is closed at
-    the period with python-control, with the expected delay and lag but without limits.
+    At construction the loop near the goal is closed at the period with python-control. It has observer, virtual body
+    and the model of the propulsion, with the expected delay and lag but without limits.
 
     Raises:
         InvalidControllerParameters: by the constructor, for an impossible body, gains that are not positive definite,

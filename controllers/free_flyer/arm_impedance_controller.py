@@ -205,13 +205,12 @@ class Outputs(BaseOutputs):
 class ArmImpedanceController(GripperController[Inputs, Outputs]):
     """u = J^T (-k_B x' + k_D x~) + B Z (w_0^2 q~ - 2 zeta w_0 q_n'): eq. (3.25) with joints that move.
 
-    x~ and x' are those of `ImpedanceController`, in the goal's axes. J is (6, 6 + n), so that n motions
-    xi' = Z q_J' leave the gripper where it is: the joints turn and the base makes up for it. The second term is the
-    dynamically consistent one, J B^-1 (B Z) = J Z = 0: it accelerates the joints without the gripper, whose motion is
-    eq. (3.26) with B_x = (J B^-1 J^T)^-1 alone. q~ is the posture's error and
-    q_n' = (Z^T B Z)^-1 Z^T B xi' the part of the motion that the gripper ignores; without damping it would last
-    for ever, and without a posture the base would stay where a push has left it. Of u = (f, tau, tau_J), with
-    twists in W, the command is f and tau turned into B, and tau_J.
+    x~ and x' are those of `ImpedanceController`, in the goal's axes. J is (6, 6 + n), so that n motions xi' = Z q_J'
+    leave the gripper where it is: the joints turn and the base makes up for it. The second term is the dynamically
+    consistent one, J B^-1 (B Z) = J Z = 0: it accelerates the joints without the gripper, whose motion is eq. (3.26)
+    with B_x = (J B^-1 J^T)^-1 alone. q~ is the posture's error and q_n' = (Z^T B Z)^-1 Z^T B xi' the part of the motion
+    that the gripper ignores. Without damping it would last for ever, and without a posture the base would stay where a
+    push has left it. Of u = (f, tau, tau_J), with twists in W, the command is f and tau turned into B, and tau_J.
 
     At construction the loop near rest in the posture, with 12 + 2 n states (18 + 2 n with a lag), is closed as that of
     `ImpedanceController`. Rotational damping must suit the lightest of what turns with the gripper: with table 4.1's

@@ -52,11 +52,11 @@ class HandoverStateMachine(SampledController[Inputs, Outputs]):
     """Runs a handover through the states of figure 3.1.
 
     - Robot to human, figure 3.2: OPEN_GRIPPER, MOVE_TO_OBJECT (at the end straight ahead, for what is touched floats
-      away), GRASP_OBJECT, MOVE_TO_HANDOVER, ACTIVATE_IMPEDANCE, SIGNAL, CHECK_VELOCITY until the gripper is faster than
-      release_velocity, RELEASE_OBJECT, DEACTIVATE_IMPEDANCE, RETREAT, DONE.
-    - Human to robot, figure 3.3: OPEN_GRIPPER, MOVE_TO_HANDOVER, ACTIVATE_IMPEDANCE, SIGNAL, CHECK_VELOCITY until it
-      is faster than receive_velocity, CLOSE_GRIPPER, CHECK_ANGLE; above angle_threshold it holds the object and goes on
-      as above, else the reception has failed: OPEN_GRIPPER, and from SIGNAL again.
+      away), GRASP_OBJECT, MOVE_TO_HANDOVER, ACTIVATE_IMPEDANCE, SIGNAL, CHECK_VELOCITY. Once the gripper is faster than
+      release_velocity: RELEASE_OBJECT, DEACTIVATE_IMPEDANCE, RETREAT, DONE.
+    - Human to robot, figure 3.3: OPEN_GRIPPER, MOVE_TO_HANDOVER, ACTIVATE_IMPEDANCE, SIGNAL, CHECK_VELOCITY. Once the
+      gripper is faster than receive_velocity: CLOSE_GRIPPER, CHECK_ANGLE. Above angle_threshold it holds the object and
+      goes on as above. Else the reception has failed: OPEN_GRIPPER, and from SIGNAL again.
     - Collaborative, sec. 5.5: robot to human up to RELEASE_OBJECT, then, from ACTIVATE_IMPEDANCE, human to robot.
     - Hold: ACTIVATE_IMPEDANCE, to the end.
 

@@ -50,8 +50,8 @@ class ImpedanceController(GripperController[Inputs, Outputs]):
     """u = J^T (-k_B x' + k_D x~), eq. (3.25), with x~ = x_d - x and x_d' = 0: no force sensor is needed.
 
     x is the gripper's pose. Its error is p_WG_goal - p_WG and, in place of differences of Euler angles, the rotation
-    vector of R_GD, D being the goal's frame, of at most half a turn; x' is the gripper's velocity and angular
-    velocity. All of them and the gains are in the goal's axes, so that spring and damper are fixed to the goal, and the
+    vector of R_GD, of at most half a turn. D is the goal's frame, and x' is the gripper's velocity and angular
+    velocity. All of them and the gains are in the goal's axes. So spring and damper are fixed to the goal, and the
     linearised loop is the same for any goal. With fixed joints J is eq. (3.11) of the base alone: with f the force in
     the brackets and tau its torque, the command is, in B, F = f and M = tau + p_BG x f. Eq. (4.3) turns generalised
     forces of Euler angles into these; with twists it is a rotation into B.

@@ -161,9 +161,8 @@ class Params:
         minimum=0.0,
         maximum=0.5,
         origin=assumed(
-            "a control of our own: about as far forward as the reflex goes in nominal poses (31 mm; held "
-            "as the reflex in nominal poses, less in perturbed ones; with 55 mm nearly as the reflex in "
-            "both)"
+            "a control of our own: about as far forward as the reflex goes in nominal poses, 31 mm. It grasps as "
+            "often as the reflex in nominal poses and less often in perturbed ones; with 55 mm nearly as often in both"
         ),
     )
     a: Metre = parameter(0.062, "constant of eq. (11)", minimum=0.0, maximum=1.0, origin=_CURVE)

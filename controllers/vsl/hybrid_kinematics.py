@@ -260,9 +260,9 @@ class HybridKinematics:
 
     The command feeds the currents back to themselves: an arm that swings feels its own inertia, and takes it for a
     load. Two lags of i_lag in series attenuate that. With an arm that swings at 4 Hz, 0.1 s and less amplify the swing,
-    and 0.15 s and more do not; at 0.5 s the tip's error is half as large again on a path at 0.05 m/s. The gears'
-    friction acts the same way: commanded to hold still, the arm hunts, at 0.5 bar and 75 g the tip by 4 mm up and down
-    in 3 s.
+    and 0.15 s and more do not. At 0.5 s the tip's error is half as large again on a path at 0.05 m/s. The gears'
+    friction acts the same way: commanded to hold still, the arm hunts. At 0.5 bar and 75 g the tip goes 4 mm up and
+    down in 3 s.
 
     Beyond the source, each can be used alone: friction compensation (`CurrentFilter`), the closed loop (`TipFeedback`)
     and the damping of vibrations (`VibrationDamping`). The closed loop is by the tracker, of both methods, or by IMUs

@@ -80,8 +80,8 @@ class CamerasAndMarkers:
         _P_WC_THIRD,
         "position of the third camera in the world",
         origin=assumed(
-            "sec. 5.4.1: one of the cameras looking down from the top, also beside the other two as a "
-            "third; where, is open: 50 degrees down on what all look at"
+            "sec. 5.4.1: one of the cameras looking down from the top, also beside the other two as a third. Where is "
+            "open: 50 degrees down on what all look at"
         ),
     )
     q_WC_third: Vector4[Number] = parameter(

@@ -31,8 +31,8 @@ _UNIT_TOLERANCE = 1e-6  # of a quaternion's length
 _MIN_DEPTH = 0.02  # m; points nearer to the lens, or behind it, are not projected
 
 FRAMES: Final = {
-    "W": "world: right-handed, z up. Its origin is at the middle of the Helix's mount, at the foot of the VSL arm, "
-    "near the place of a free-flyer's handover, on the table of the grasp scene",
+    "W": "world: right-handed, z up. Its origin is the middle of the Helix's mount, or the foot of the VSL arm. Of "
+    "the free-flyers it is near the place of the handover, in the grasp scene on the table",
     "B": "base of an arm or a free-flying body. The Helix's has z down, along the hanging arm (R_WB = diag(1, -1, "
     "-1)). A free-flyer's has its origin at the centre of mass and its arm along -x",
     "R": "marker ring at the wrist: z along the arm towards the gripper",

@@ -90,7 +90,7 @@ class Extrapolation(enum.Enum):
 class Algorithm(enum.Enum):
     """How units that are due at the same time get their inputs; `summary` says it of each.
 
-    With all, the units of an algebraic loop repeat the step after a rollback until they converge; some iterate all
+    With all, the units of an algebraic loop repeat the step after a rollback until they converge. Some iterate all
     units that are connected in a cycle so (iterated, strong or implicit coupling). FIXED_POINT solves all loops, also
     those at the start, by its own iteration, the others by Newton's method.
     """

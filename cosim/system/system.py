@@ -142,8 +142,8 @@ class System:
 
         Real values are converted to the input's unit where both have the same dimension. A `transformation` replaces
         that conversion, whatever the units; it is for one connection of real values. Instead of ports, two terminals
-        can be named, `connect(arm.y.gripper, camera.u.gripper)`: all outputs of the one feed the inputs of the other,
-        or, where the two do not match, none does, and `check` says why. Of terminals, what was connected is returned.
+        can be named, `connect(arm.y.gripper, camera.u.gripper)`: all outputs of the one feed the inputs of the other.
+        Where the two do not match, none does, and `check` says why. Of terminals, what was connected is returned.
 
         Of two units, terminals that match are connected first: by their names, then by their kinds. Each other input is
         fed by the output of the same name, kind and shape whose unit is the same or can be converted. Inputs of a

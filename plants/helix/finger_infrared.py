@@ -165,12 +165,11 @@ class FingerInfrared:
     """Two sensors in each of three fingertips: one looks across to the gripper's axis, one ahead to what it comes to.
 
     A sensor's beam is a bundle of rays about an axis that is fixed in the finger's last link, so that it turns as the
-    finger closes. A ray meets the ball, the palm (a disc that faces up), or nothing; fingers do not see each other.
-    The reading is the mean over the rays of `InfraredSensor.ticks`, since returned intensities add up, times the
-    sensor's own gain, plus noise, rounded. Each sensor differs from the design by its gain, its range and the way it
-    is mounted: s being its range, it reads at s y what the characteristic says of y. All are read in one round, one
-    being active at a time ([Luberto] sec. V-B); that gripper and ball move within the round, which takes 30 ms, is
-    left out.
+    finger closes. A ray meets the ball, the palm (a disc that faces up), or nothing; fingers do not see each other. The
+    reading is the mean over the rays of `InfraredSensor.ticks`, since returned intensities add up, times the sensor's
+    own gain, plus noise, rounded. Each sensor differs from the design by its gain, its range and the way it is mounted.
+    With range s it reads at s y what the characteristic gives for y. All are read in one round, one being active at a
+    time ([Luberto] sec. V-B); that gripper and ball move within the round, which takes 30 ms, is left out.
 
     Raises:
         InvalidInfraredParameters: by the constructor, for parameters out of range or a characteristic that does not

@@ -77,8 +77,8 @@ class Outputs:
 class GraspScene:
     """Soft hand, object and table in the plane x-y of W, with three infrared sensors, after [Luberto] sec. III, V.
 
-    - Hand: a palm that follows the wrist's command with bounded speed and acceleration (`follow`), a thumb
-      of 2 phalanges on its right (-y of H), index and ring finger of 3 on its left. One elastic tendon,
+    - Hand: a palm that follows the wrist's command with bounded speed and acceleration (`follow`). On its right
+      (-y of H) it has a thumb of 2 phalanges, on its left index and ring finger of 3. One elastic tendon,
       T = k max(0, sigma L - sum r q), turns all joints, so a blocked finger lets the others close further.
     - Object: rigid, with dry friction on the table and in the hand; `SOLIDS` has the shapes. The ground below it may
       move, as a belt that carries it (`carry_velocity`) or a bump (`nudge`): then friction acts against that motion.

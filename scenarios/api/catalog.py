@@ -34,8 +34,8 @@ def unit(name: str, fmi: Literal[2, 3] = 3) -> Path:
     """Return the FMU of a unit, for `System.add`; it is built where it is not yet.
 
     Args:
-        name: a unit of the catalog or of an installed package, such as "TendonArm", or the path of a block, such as
-            "my_arm:MyArm", whose module is looked for in the working directory, too.
+        name: a unit of the catalog or of an installed package, such as "TendonArm"; or the path of a block, such as
+            "my_arm:MyArm". Its module is looked for in the working directory, too.
         fmi: 2 or 3.
 
     Raises:

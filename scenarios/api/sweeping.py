@@ -79,8 +79,8 @@ def sweep(
         seeds: runs of each combination.
         seed: of the campaign, from which those of the runs follow.
         paired: whether all combinations get the same seeds, so that they can be compared run by run.
-        units: what takes the place of the scenario's units, by their names: files of FMUs, or blocks as `my_arm:MyArm`;
-            a list varies the unit.
+        units: what takes the place of the scenario's units, by their names: files of FMUs, or blocks as `my_arm:MyArm`.
+            A list varies the unit.
         out: the folder of the campaign.
         start: as of `handover.run`.
         stop: as of `handover.run`.

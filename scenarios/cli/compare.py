@@ -28,9 +28,9 @@ Examples
   handover compare a b --name rigid --name compliant --signal robot.p_WB
 
 Points of campaigns are matched by the values of the parameters that any of them varies. At each, success rates and
-metrics stand beside each other with 95 % intervals, and each two campaigns are tested against each other: run by run
-where they share seeds, as campaigns with the same points and --seed do. Five pairs cannot show a difference, however
-large: p stays at 0.0625 or above; six can. Of runs, the same curves are drawn over each other.
+metrics stand beside each other with 95 % intervals. Each two campaigns are tested against each other: run by run where
+they share seeds, as campaigns with the same points and --seed do. Five pairs cannot show a difference, however large: p
+stays at 0.0625 or above; six can. Of runs, the same curves are drawn over each other.
 
 The folder holds report.html, comparison.csv and comparison.json; figures/ has figures in the width of a column, as
 PDF, SVG and PNG.

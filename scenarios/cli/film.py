@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 _HELP = """Make a film of the run in DIR: its scene, and beside it plots over time with a cursor that moves.
 
 The suffix of FILE says what it is: .mp4, .webm or .gif. It is drawn without a window in Chromium, by software, which
-takes some seconds for each second of the film; on the report's page, "record a video" records the scene alone.
+takes some seconds for each second of the film. On the report's page, "record a video" records the scene alone.
 """
 _SUFFIXES = (".mp4", ".webm", ".gif")
 _VIEWS = ("start", "front", "side", "top", "follow")

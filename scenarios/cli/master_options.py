@@ -54,7 +54,7 @@ _OPTIONS = (
         "--algorithm",
         type=_choice(Algorithm),
         default=_PLAIN.algorithm.value,
-        help=f"Which values units step from. {'; '.join(f'{a.value}: {a.summary}' for a in Algorithm)}.",
+        help=f"Which values units step from. {' '.join(f'{a.value}: {a.summary}.' for a in Algorithm)}",
     ),
     _coupling_option(
         "--tolerance",
@@ -85,10 +85,9 @@ _OPTIONS = (
         "--adaptive",
         type=_Above0(),
         metavar="ERROR",
-        help="Let the step follow its error, with rollback: what one step may be wrong by, relative to a signal's"
-        " magnitude, such as 1e-4; errors of steps add up over a run. Connected real outputs are controlled (all where"
-        " none is). `--extrapolation linear` pays here, with longer steps for the same error."
-        "  [default: fixed steps]",
+        help="Let the step follow its error, with rollback: what one step may be wrong by, relative to a signal's "
+        "magnitude, such as 1e-4. Errors of steps add up over a run. Connected real outputs are controlled (all where "
+        "none is). `--extrapolation linear` pays here, with longer steps for the same error.  [default: fixed steps]",
     ),
     _step_option(
         "--adaptive-absolute",

@@ -12,7 +12,7 @@ from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder, c
 
 _HELP = """Write the page of the run or campaign in DIR again: one HTML file that opens offline.
 
-The page is made of what is in DIR, also of a run that was interrupted or killed, or that another version wrote: a run's
+The page is made of what is in DIR, also of a run that was interrupted or killed, or that another version wrote. A run's
 record, or a campaign's table, is completed first, and the page shows what there is.
 
 With --runs, each run of a campaign gets its page, too, to which the campaign's page links; each takes some 5 MB.

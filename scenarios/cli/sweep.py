@@ -39,7 +39,7 @@ NAME=VALUES is a list or a range of numbers:
   servo.alpha_0=0.1,0.2   a parameter of the unit servo, whatever FMU it is
   --unit servo=a.fmu,b.fmu  the unit itself, by files or MODULE:CLASS
 
-Parameters of FILE.fmu have its own names, those of FILE.ssp are UNIT.NAME or its own, as for `handover run -p`; results
+Parameters of FILE.fmu have its own names, those of FILE.ssp are UNIT.NAME or its own, as for `handover run -p`. Results
 are the last, smallest and largest value of each output, and of what --record names.
 
 \b

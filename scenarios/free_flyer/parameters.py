@@ -169,8 +169,8 @@ class HandoverParameters(RobotAndModel):
     )
     skill: Number = parameter(
         1.0,
-        "the person's skill: 0 has eight times the errors of sight, timing and effort, reacts in twice the time, and "
-        "does not wait for the gripper in three of ten attempts",
+        "the person's skill. At 0, errors of sight, timing and effort are eight times as large and reactions take "
+        "twice the time; the person does not wait for the gripper in three of ten attempts",
         minimum=0.0,
         maximum=1.0,
         origin=assumed(
@@ -198,8 +198,8 @@ class HandoverParameters(RobotAndModel):
         NavigationParams,
         *_of_each("navigation.delay"),
         maximum=0.2,
-        description="age of the estimate of the robot's pose and velocities, which the controllers expect and reject "
-        "where they would be unstable with it; of one that they do not know, set navigation.delay",
+        description="age of the estimate of the robot's pose and velocities. Controllers know it, and refuse one with "
+        "which they would be unstable; for one that they do not know, set navigation.delay",
     )
     gated: bool = expose(DecisionParams, "decision.gated")
     patience: float = expose(DecisionParams, "decision.patience", minimum=1.0, maximum=600.0)

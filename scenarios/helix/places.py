@@ -5,9 +5,8 @@ from dataclasses import replace
 from handover.scenarios.experiment.places import Place
 
 _BASE = (
-    "W is the world: its origin is the arm's mount, z points up, x away from the cameras, y to their left. In B, the "
-    "arm's base frame, z points down along the hanging arm: x of B is x of W, y of B is minus y of W, z of B is minus "
-    "z of W."
+    "W is the world: its origin is the arm's mount, z points up, x away from the cameras, y to their left. B is the "
+    "arm's base frame, with z down along the hanging arm: R_WB = diag(1, -1, -1)."
 )
 _CALIBRATION = {
     f"{what}_{side}": ""
@@ -107,11 +106,12 @@ PLACES = {
         advised=("closure",),
         remarks=(
             _BASE,
-            "Calibrated, the arm hangs straight with segments of 0.12, 0.24 and 0.24 m, tendons 0.035 m from its axis; "
-            "the gripper is 0.1 m beyond. With Dx and Dy a segment's rotation, rad, towards x and y of B, and l its "
-            "length, m, the tendon at angle s has the length l - 0.035 (Dx cos s + Dy sin s).",
-            "Without phase, the gripper itself gives when it begins to close (closure above 0) and when it has closed; "
-            "without error, the distance of gripper and ball is taken for it. Without closure it stays open.",
+            "Calibrated, the arm hangs straight with segments of 0.12, 0.24 and 0.24 m, tendons 0.035 m from its "
+            "axis; the gripper is 0.1 m beyond. Dx and Dy are a segment's rotation, rad, towards x and y of B, and l "
+            "is its length, m. The tendon at angle s has the length l - 0.035 (Dx cos s + Dy sin s).",
+            "Without phase, the gripper itself gives when it begins to close (closure above 0) and when it has "
+            "closed. Without error, the distance of gripper and ball takes its place. Without closure the gripper "
+            "stays open.",
         ),
     ),
     "arm": Place(

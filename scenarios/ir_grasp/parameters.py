@@ -85,9 +85,8 @@ class Parameters:
         "",
         "folder of an earlier run, whose estimated Jacobian correction=fast begins with; empty: the hand's design",
         origin=assumed(
-            "own; over 40 scenes of 8 things (seeds 777000 to 777005) it changes neither what is held, 40 "
-            "of 40, nor the time of refinement, 4.4 s in the median: sensors say soon enough what the "
-            "design leaves open"
+            "own. Over 40 scenes of 8 things (seeds 777000 to 777005) it changes neither what is held, 40 of 40, nor "
+            "the median time of refinement, 4.4 s. Sensors say soon enough what the design leaves open"
         ),
         needs=(being("correction", Correction.FAST),),
     )
@@ -98,8 +97,8 @@ class Parameters:
         minimum=0.0,
         maximum=0.3,
         origin=assumed(
-            "not given; chosen so that the blind hand mostly fails in nominal poses, as in table I; one "
-            "that closes 55 mm nearer does nearly as well as the reflex"
+            "not given; chosen so that the blind hand mostly fails in nominal poses, as in table I. One that closes "
+            "55 mm nearer does nearly as well as the reflex"
         ),
     )
     shift_least: Metre = parameter(

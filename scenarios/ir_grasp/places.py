@@ -3,8 +3,8 @@
 from handover.scenarios.experiment.places import Place
 
 _TABLE = (
-    "The scene is planar, seen from above: W lies on the table, with its origin where vision saw the object; headings "
-    "turn counter-clockwise from x of W, and the hand points along its heading."
+    "The scene is planar, seen from above: W lies on the table, with its origin where vision saw the object. Headings "
+    "turn counter-clockwise from x of W; the hand points along its heading."
 )
 _HAND = {"p_WH": "in W", "yaw": "counter-clockwise from x of W", "sigma": ""}
 _COMMAND = {

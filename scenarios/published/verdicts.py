@@ -110,8 +110,8 @@ def order_claim(
     test, n = paired_test(first, second), len(first)
     reason = (
         f"{'Holds' if beyond else 'Reproduced'} if McNemar's exact test of runs in the same scenes rejects at "
-        f"{format_share(LEVEL)}, in this direction: of {counted(n, 'pair')} only the first succeeded in "
-        f"{test.only_first}, only the second in {test.only_second}; p = {format_p_value(test.p)}. {note}"
+        f"{format_share(LEVEL)}, in this direction. Of {counted(n, 'pair')} only the first succeeded in "
+        f"{test.only_first}, only the second in {test.only_second}: p = {format_p_value(test.p)}. {note}"
     )
     return Claim(
         claim=claim,
@@ -136,7 +136,7 @@ def no_worse_claim(claim: str, first: Sequence[bool], second: Sequence[bool]) ->
     interval = success_interval(test.only_second, n)
     reason = (
         "Holds if the share of scenes in which only the second succeeds has an interval (Clopper-Pearson) below "
-        f"{format_share(FEW)}: of {counted(n, 'pair')} that is so in {test.only_second}, "
+        f"{format_share(FEW)}. Of {counted(n, 'pair')} that is so in {test.only_second}, "
         f"{format_interval(interval.low, interval.high)}; the reverse in {test.only_first}; McNemar's p = "
         f"{format_p_value(test.p)}."
     )

@@ -37,8 +37,8 @@ def figures_of_pick_and_place(parameters: PickAndPlaceParameters, record: Record
     return [
         TimeFigure(
             name="task",
-            caption="Heights in W, with that of the face on which the object stands; the largest force, within each "
-            "period, of that face on the gripper or on what it holds; and the pressure in link 3.",
+            caption="Heights in W, with that of the face on which the object stands, and the pressure in link 3. "
+            "Forces are the largest within each period, of that face on the gripper or on what it holds.",
             plots=[
                 TimePlot(
                     title="Heights",

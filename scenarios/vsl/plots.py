@@ -212,7 +212,7 @@ def _errors(evaluator: PathEvaluator, folder: Path) -> Figure:
         reach.set(xlabel=label, ylabel="error of the tip (mm)", ylim=(0.0, None))
     caption = (
         "Left: distances to the desired points or to the true tip, by the servos' encoders and rigid links, by the "
-        "tracker, or by the hybrid model. 25th to 75th percentile (box), range, median (line) and mean (dot). Right: "
+        "tracker, or by the hybrid model. Boxes: 25th to 75th percentile; lines: median and range; dots: mean. Right: "
         "error of the tip over the desired point's place."
     )
     return Figure("errors", caption)

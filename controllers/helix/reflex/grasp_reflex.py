@@ -307,16 +307,16 @@ class GraspReflex:
 
     - While the cameras see both, their measurements go on to the servo, the ball's less what the fingers find the
       cameras to have wrong, beta.
-    - Where they see one or none, and the gripper is near, wrist and gripper go on by dead reckoning from the motors,
-      and the ball is put where the filter has it from there. So an error of reckoning is the ball's as well, and the
-      servo centres the gripper by what the fingers feel. With `feels` false that is dead reckoning.
+    - Where they see one or none, and the gripper is near, wrist and gripper go on by dead reckoning from the motors.
+      The ball is put where the filter has it from there: an error of reckoning is the ball's as well, and the servo
+      centres the gripper by what the fingers feel. With `feels` false that is dead reckoning.
     - Else, or where the filter's deviation exceeds `lost`, what is not seen is not known (`known_O`, `known_R`).
 
     The gripper's orientation is that of the servo's estimated state, without twist. Nothing here closes the gripper:
     the servo does, when its error is small.
 
-    `dl_t` and `q_est` are the servo's of its last period, so no output is declared to depend on them at once: the servo
-    depends on what comes from here, and a host computes it after this unit.
+    `dl_t` and `q_est` are the servo's of its last period, so no output is declared to depend on them at once. The servo
+    depends on this unit's outputs, and a host computes it after this unit.
 
     Raises:
         InvalidGraspReflexParameters: by the constructor, for values out of range or that contradict each other.

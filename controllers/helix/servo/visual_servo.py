@@ -37,7 +37,7 @@ class Outputs:
     phase: Phase = output("what the arm is doing")
     q_est: Vector9[Number] = output("state that explains the measured pose: Dx, Dy (rad), l (m) of each segment")
     q_sys: Vector9[Number] = output(
-        "state that is commanded, before it is averaged over shaping_time: Dx, Dy (rad), l (m) of each segment"
+        "commanded state, before it is averaged over shaping_time: Dx, Dy (rad), l (m) of each segment"
     )
     error: Metre = output(
         "distance of the gripper from its goal, or norm over wrist and gripper; of no meaning in WAIT"
@@ -60,7 +60,7 @@ class VisualServo:
     X_goal = [p_WG_goal + d_gripper z, p_WG_goal]. The mount, B, is at the origin of W.
 
     The error is the distance of the gripper from its goal (judge_apart), or the norm |X_goal - X_meas| over all six
-    coordinates, in m, where the source prints its square and compares it with metres.
+    coordinates, in m. The source prints its square and compares it with metres.
 
     Own additions: see `Params`. The command is held while the ring is not seen, since there is no feedback. Without
     ring or ball for lost_after the phase is RECOVER: back along the last commands, then a search. A ball without a ring

@@ -58,9 +58,9 @@ class Outputs:
 class HandoverVision:
     """Measures ball, wrist and gripper: p_WG = p_WR + d_gripper z_R, eqs. (12)-(13).
 
-    Two detectors do it: `JointDetector` fits one pose to all marker corners in all pictures, and a sphere to the
-    ball's outlines; `PublishedDetector` averages single markers and triangulates circles, as the thesis has it. A step
-    that looks at no pictures (decimation) repeats the last measurement.
+    Two detectors do it. `JointDetector` fits one pose to all marker corners in all pictures, and a sphere to the ball's
+    outlines. `PublishedDetector` averages single markers and triangulates circles, as the thesis has it. A step that
+    looks at no pictures (decimation) repeats the last measurement.
 
     The state is the last measurement, and the detector's.
 

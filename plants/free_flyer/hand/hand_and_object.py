@@ -90,11 +90,11 @@ class HandAndObject:
 
     One unit, because a bare 0.1 kg object that two units exchange by forces is unstable at a few milliseconds. Here the
     gripper's displacement goes in and its wrench, the mean over the step, is put out: stable at 16 and 32 ms. In a
-    system this unit comes after the robot; the gripper is interpolated from the last step's pose to this one's, and its
+    system this unit comes after the robot. The gripper is interpolated from the last step's pose to this one's; its
     wrench acts on the robot in the next step.
 
     Raises:
-        InvalidHandParameters: by the constructor, for parameters that contradict each other; by the first step, if the
+        InvalidHandParameters: by the constructor, for parameters that contradict each other. By the first step, if the
             gripper starts in the hand or has the free object in its palm or its closed fingers.
         InvalidTrack: by the constructor, for a track that cannot be followed.
         TurnsTooFast: see `RigidBody`.

@@ -126,11 +126,11 @@ class LargeObjectAndHands:
     Only handles are touched: nothing collides with the box, nor the robots with each other. A hand that is not used
     rests beside the other one.
 
-    One unit for the reason that `HandAndObject` is one; in a system it comes after the robots, whose grippers are
-    interpolated from the last step's pose to this one's, and whose wrenches act in the next step.
+    One unit for the reason that `HandAndObject` is one. In a system it comes after the robots. Their grippers are
+    interpolated from the last step's pose to this one's; wrenches act on them in the next step.
 
     Raises:
-        InvalidLargeObjectParameters: by the constructor, for parameters that contradict each other; by the first step,
+        InvalidLargeObjectParameters: by the constructor, for parameters that contradict each other. By the first step,
             if a gripper starts in a hand or has a handle in its palm or its closed fingers.
         TurnsTooFast: see `RigidBody`.
     """

@@ -182,10 +182,10 @@ class Navigation:
     robot's frame. Noise has random numbers of its own: it is the same with bias and drift and without.
 
     Inputs are the truth at the end of a step: in a system the navigation comes after the robot, and sees where the
-    robot got in the same step. Between communication points the truth is interpolated, linearly, and of orientations
-    by normalised linear interpolation, so a delay or an interval of updates need not be a multiple of the step. Before
-    the start the robot counts as having been where it starts. Updates are at multiples of 1 / `update_rate`, and the
-    estimate is held between them; of those within one step the last one counts.
+    robot got in the same step. Between communication points the truth is interpolated linearly, orientations with
+    normalisation. So a delay or an interval of updates need not be a multiple of the step. Before the start the robot
+    counts as having been where it starts. Updates are at multiples of 1 / `update_rate`, and the estimate is held
+    between them; of those within one step the last one counts.
 
     Raises:
         InvalidNavigationParameters: by the constructor, for values out of range, or a drift without correlation time.

@@ -64,8 +64,8 @@ class Push:
     """Gives the mean of a rectangular pulse over each step: w = w_0 |[t, t + dt] and [start, start + duration]| / dt.
 
     Steps follow each other without gaps, so the impulse w_0 duration is exact wherever the pulse's edges lie. In a
-    system the push comes before the robot, which then uses the mean in the same step; placed after the
-    robot, or with Jacobi's order, the push comes one step later and is as large. No time has passed at the start: zero.
+    system the push comes before the robot, which then uses the mean in the same step. Placed after the robot, or with
+    Jacobi's order, the push comes one step later and is as large. No time has passed at the start: zero.
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}

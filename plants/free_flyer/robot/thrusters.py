@@ -182,14 +182,13 @@ class Thrusters:
 
     The command is constant in a step, so thrust and its integral are exact: over d seconds of command c,
     y <- c + (y - c) e^(-d/T) and its integral is c d + (y - c) T (1 - e^(-d/T)). The outputs are the mean over the
-    step that ends, so that the robot gets the whole impulse; in a system the thrusters come before the robot, which
+    step that ends, so that the robot gets the whole impulse. In a system the thrusters come before the robot, which
     then uses the mean in the same step. Where a delay is not a multiple of the step, two commands share it.
 
-    With nozzles the clipped command is shared among twelve, and scaled down where they do not have it (`Nozzles`); it
-    is their thrusts that are delayed, and flappers and impellers that lag (`PropulsionModules`). Axes are clipped first
-    as Astrobee's controller does, or a torque of forty times the largest would leave a fortieth of the force.
-    That impellers turn the robot as they change their speed, or by its turning, is left out: the two turn opposite
-    ways.
+    With nozzles the clipped command is shared among twelve, and scaled down where they do not have it (`Nozzles`).
+    Their thrusts are delayed, and flappers and impellers lag (`PropulsionModules`). Axes are clipped first as
+    Astrobee's controller does, or a torque of forty times the largest would leave a fortieth of the force. That
+    impellers turn the robot as they change their speed, or by its turning, is left out: the two turn opposite ways.
 
     Raises:
         InvalidThrusterParameters: by the constructor, if limits or stuck nozzles leave no thrust in a direction.

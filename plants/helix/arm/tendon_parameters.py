@@ -23,8 +23,8 @@ from handover.cosim.blocks.units import (
 )
 
 _FITTED = assumed(
-    "such that at rest, for one commanded state far forward, model and arm are 0.29, 0.16 and "
-    "0.14 m apart, as in sec. 5.2; in the closed loop they end 0.08 m apart: see fitted_arm"
+    "such that at rest, for one commanded state far forward, model and arm are 0.29, 0.16 and 0.14 m apart, as in "
+    "sec. 5.2. In the closed loop they end 0.08 m apart: see fitted_arm"
 )
 
 

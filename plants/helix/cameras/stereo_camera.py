@@ -104,14 +104,14 @@ class StereoCamera:
     blurred, lit unevenly and given sensor noise. A step shows the scene at its start, as the inputs give it; one that
     takes no pictures (decimation) repeats the last ones.
 
-    What may be wrong: the left or the right lens is covered for a while, light is poor, pictures get lost (each by
-    itself), tape covers markers, a card hides the ball from the left and the right camera. A gripper that hides the
-    ball as it comes near, as a bulkier one than is painted here would, is `hide_ball_within`; one behind which nothing
-    is seen any more, `cover_within`.
+    What may be wrong: the left or the right lens is covered for a while, light is poor, or pictures get lost (each by
+    itself). Tape may cover markers, and a card may hide the ball from the left and the right camera. A gripper that
+    hides the ball as it comes near, as a bulkier one than is painted here would, is `hide_ball_within`; one behind
+    which nothing is seen any more, `cover_within`.
 
-    The state is that of the noise, how near gripper and ball came, and the scene of the last pictures: they are painted
-    again from these, unless they are those that were painted last. Pictures cannot be written to, since they may be
-    handed out again.
+    The state is that of the noise, how near gripper and ball came, and the scene of the last pictures. They are painted
+    again from it, unless they are those that were painted last. Pictures cannot be written to, since they may be handed
+    out again.
 
     Raises:
         InvalidCalibration: a quaternion is not of unit length or a focal length not positive.

@@ -47,8 +47,8 @@ class HandoverPartner:
     - HAND: the hand touches the ball, or has within the last 50 ms.
     - GRIPPER: the gripper does, and the hand does not.
     - FREE: neither. From then on the ball falls with the velocity that it had, and nobody catches it. Where there is a
-      `Bowl` and its centre comes through the rim's plane within the rim, it rolls in there until it rests; else it
-      rests on the floor, whatever is in its way.
+      `Bowl` and the ball's centre comes through the rim's plane within the rim, it rolls in there until it rests. Else
+      it rests on the floor, whatever is in its way.
 
     The gripper's motion in a step is taken as even between the inputs of the step before and those of this one. Forces,
     ball and hand therefore trail the gripper by one step. With the arm, contacts are calm at 10 ms, where 5 ms gives

@@ -60,8 +60,8 @@ class Params(BowlParameters):
     )
     room: Metre = parameter(
         0.12,
-        "distance from the arm's axis, where the arm hangs, at which the person waits with a ball that goes nearer to "
-        "it, until the gripper is higher",
+        "distance from the hanging arm's axis at which the person waits with a ball that goes nearer, until the "
+        "gripper is higher",
         minimum=0.0,
         maximum=1.0,
         origin=assumed("open fingers reach 5 cm from the gripper's axis, the palm 4.5 cm from the ball's middle"),

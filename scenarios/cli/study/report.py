@@ -73,8 +73,8 @@ def export(folder: Path) -> None:
 def replay(folder: Path, participant: str, number: int, *, check: bool) -> None:
     """Show what happened in a ROUND of a PARTICIPANT, such as P01, and write the page of its run, with the replay.
 
-    With --check the round is run again with the hand's recorded inputs; exit status 1 says that a signal has not the
-    same bytes as in the record, and the first difference is named.
+    With --check the round is run again with the hand's recorded inputs. Exit status 1 says that a signal has not the
+    same bytes as in the record; the first difference is named.
     """
     if check:
         _check(folder, participant, number)

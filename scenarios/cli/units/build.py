@@ -70,8 +70,9 @@ spring:Spring for the class Spring in spring.py; modules are looked for in the w
 
 A unit with pictures has no FMI 2 form, since FMI 2 knows no binary variables.
 
-Each FMU contains, with their roles in a manifest (FMI-LS-REF), its source, its documentation and the parameter sets
-of the papers and, by --prove, an experiment with its result, which `handover check` runs and compares on any machine.
+Each FMU contains its source, its documentation and the parameter sets of the papers, with their roles in a manifest
+(FMI-LS-REF). By --prove it contains an experiment with its result, too, which `handover check` runs and compares on any
+machine.
 
 \b
 Environment, when units are built
@@ -141,8 +142,8 @@ Environment, when a tool loads the units
     "--stimulus",
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="Stimulus of --prove for one UNIT: CSV with columns time (s) and inputs, such as p_WG[1], held row by row "
-    " [default: steps and ramps of the inputs that have a unit or a range]",
+    help="Stimulus of --prove for one UNIT: CSV with columns time (s) and inputs, such as p_WG[1]. "
+    "Values are held until the next row.  [default: steps and ramps of the inputs that have a unit or a range]",
 )
 def build_command(
     units: Sequence[str],

@@ -29,11 +29,11 @@ _STYLES = {Level.OK: "green", Level.NOTE: "cyan", Level.WARNING: "yellow", Level
 
 _HELP = """Find what is wrong with FILEs that should be co-simulation FMUs of FMI 2.0 or 3.0, or SSPs, from any tool.
 
-The archive, its model description (by the standard's schema and rules) and its library for this machine are checked;
-then the unit is loaded and run for ten steps in a process of its own, which may crash. A unit of `handover build` reads
-its environment variables then, as in other tools: see `handover build --help`. Experiments in CSV that the FMU
-contains (FMI-LS-REF) are run, too, and the outputs compared with their results: a fault where one is beyond the
-tolerance. Of an SSP its system is checked, then each FMU in it.
+The archive, its model description (by the standard's schema and rules) and its library for this machine are checked.
+Then the unit is loaded and run for ten steps in a process of its own, which may crash. A unit of `handover build` reads
+its environment variables then, as in other tools: see `handover build --help`. Experiments in CSV that the FMU contains
+(FMI-LS-REF) are run, too, and the outputs compared with their results: a fault where one is beyond the tolerance. Of an
+SSP its system is checked, then each FMU in it.
 
 \b
 Exit status

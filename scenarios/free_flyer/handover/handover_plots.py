@@ -43,8 +43,8 @@ def figures_of_handover(parameters: HandoverParameters, record: Record) -> list[
         ),
         TimeFigure(
             name="gripper",
-            caption="Angle of the gripper with the threshold above which it counts as full; its speed, with the one at "
-            "which the robot would act; forces on gripper and hand, shaded by who holds the object.",
+            caption="Angle of the gripper with the threshold above which it counts as full; its speed, with the one "
+            "at which the robot would act. Forces on gripper and hand are shaded by who holds the object.",
             plots=[_angle(record, phases), _speed(parameters, record, phases), _forces(record)],
         ),
         TimeFigure(name="thrust", caption=CAPTION, plots=plot_thrust(record, ("impedance", "pose"), phases), columns=2),

@@ -44,7 +44,7 @@ def figures_of_team(parameters: TeamParameters, record: Record) -> list[TimeFigu
         TimeFigure(
             name="grippers",
             caption="Angles of the grippers, with the threshold above which they count as full, and the speeds by "
-            "which each robot judges whether a person moves it; shaded by the first robot's phases.",
+            "which each robot judges whether a person moves it. Shaded by the first robot's phases.",
             plots=[_angles(record, phases), _speeds(parameters, record, phases)],
         ),
         *(

@@ -107,8 +107,8 @@ class FlyerApproaches(PublishedExperiment):
         shown = {label: case for label, case in _SHOWN.items() if len(_all_of(found, case))}
         panels = [_panel(found, exchange, shown) for exchange in (GIVING, RECEIVING)] if shown else []
         caption = (
-            "Greatest speed of the gripper, as the robot sees it, while it waits where nobody is, of every approach; "
-            "dashed: the thresholds of sec. 4.1.2, from which on it lets go or closes."
+            "Greatest speed of the gripper, as the robot sees it, while it waits where nobody is, of every approach. "
+            "Dashed: the thresholds of sec. 4.1.2, from which on it lets go or closes."
         )
         return drawn(folder / "rest_speed", caption, panels, 2, size=(8.0, 1.6 + 0.34 * len(shown)))
 

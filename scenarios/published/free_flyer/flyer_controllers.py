@@ -75,8 +75,8 @@ def point(controller: str, behaviour: Behaviour, case: Case) -> Point:
 class FlyerControllers(PublishedExperiment):
     """Impedance, admittance and Astrobee's PID, rigid and compliant, in the four handovers, with limits and without.
 
-    Beside them stands a robot without any thrust while it yields, as handovers that it does as well tell nothing of a
-    controller; and, for the three, the collaborative task with limits under one disturbance at a time. The PID has no
+    Beside them stands a robot without any thrust while it yields: handovers that it does as well say nothing of a
+    controller. The three also do the collaborative task with limits under one disturbance at a time. The PID has no
     behaviours: what differs are the thresholds of the release. All points of a repetition share a seed. The quick plan
     is robot to human with limits.
     """
@@ -179,8 +179,8 @@ def _alike(runs: Runs, behaviour: Behaviour, propulsion: Propulsion) -> Claim:
     return says.judged(
         "; ".join(texts),
         max(ratios) <= 1.0 + _SIMILAR,
-        f"in each of the four handovers, of {_MIN_RUNS} runs of each controller or more, the largest mean displacement "
-        f"of {', '.join(CONTROLLERS.values())} is at most {100 * _SIMILAR:.0f} % above the smallest",
+        f"in each of the four handovers the largest mean displacement of {', '.join(CONTROLLERS.values())} is at most "
+        f"{100 * _SIMILAR:.0f} % above the smallest. It takes {_MIN_RUNS} runs of each controller",
         f"It is up to {100 * (max(ratios) - 1):.0f} %.",
         enough=fewest >= _MIN_RUNS and len(ratios) == len(Task),
     )

@@ -94,8 +94,8 @@ class FlyerHandoverTable(PublishedExperiment):
     """The four handovers by the rigid and by the compliant robot, with ideal thrust, Astrobee's limits and its nozzles.
 
     Where the robot gives, there are besides persons who pull with other forces, arms of other lengths, other places.
-    Where it gives or receives, there are the control rate that the thesis prints, and a robot that yields while it
-    still moves, for the thesis names no condition of rest. The quick plan is one run of each of the first 24.
+    Where it gives or receives, there is the control rate that the thesis prints. There is also a robot that yields
+    while it still moves, for the thesis names no condition of rest. The quick plan is one run of each of the first 24.
     """
 
     name: ClassVar[str] = "flyer-handover"
@@ -322,8 +322,8 @@ def _displacement(runs: HandoverRuns) -> Claim:
     return says.judged(
         ", ".join(shown[label] for label in runs.by_force(variations=(USUAL,))),
         bool(fits),
-        "there is a strength among those tried that both robots feel, with any thrust, at which the compliant robot's "
-        f"median and its ratio to the rigid one's are within {100 * near:.0f} % of the thesis's",
+        "at a strength that both robots feel, with any thrust, the compliant robot's median and its ratio to the "
+        f"rigid one's are within {100 * near:.0f} % of the thesis's",
         f"The thesis does not say how strongly its user pulled, and {_USUAL_FORCE} were chosen since they move the "
         "rigid robot about as far. "
         + (f"It is so at: {'; '.join(fits)}." if fits else f"The nearest were {shown[nearest]}."),
@@ -350,8 +350,8 @@ def _ten_times(runs: HandoverRuns) -> Claim:
     return says.judged(
         _by_propulsion(ratios),
         any(map(is_ten, tried.values())),
-        "at a force that both robots feel, with any thrust, the ratio of the medians is within "
-        f"{100 * near:.0f} % of it, which the thesis's own {rigid:g} and {compliant:g} m do not have",
+        f"at a force that both robots feel, with any thrust, the ratio of the medians is within {100 * near:.0f} % of "
+        f"it. The thesis's own {rigid:g} and {compliant:g} m are not",
         f"A pull that one of them does not feel has it: {unfelt}." if unfelt else "",
         enough=len(tried) > len(THRUSTS),
     )

@@ -70,7 +70,7 @@ def draw_handovers(
         moved = [(b, m) for b, record in records if (m := _yielding(record, b)) is not None]
         panels = [panel for b, m in moved for panel in _panels_of_yielding(b, m)]
         caption = (
-            f"Gripper from its place in W while the robot first yields, {TASKS[task]}, with ideal thrust; dotted: the "
+            f"Gripper from its place in W while the robot first yields, {TASKS[task]}, with ideal thrust. Dotted: the "
             "linear response of the controller's model, by python-control, to what the person does to the gripper."
         )
         yielding += drawn(folder / f"yielding_{task.item}", caption, panels, 2, size=(9.0, 0.9 + 2.3 * len(moved)))
@@ -164,8 +164,8 @@ def _margins(find: Find, thrusts: Sequence[Propulsion], folder: Path) -> list[Fi
                 Mark([alpha, alpha], [-0.42, 0.42], "-", SOFT, "threshold", style={"lw": 1.6}),
             )
     caption = (
-        "Speed of the gripper as the robot sees it: the greatest while it waits and nobody touches it, and when it "
-        "felt the person, in each run; between them its threshold, that of sec. 4.1.2."
+        "Speed of the gripper as the robot sees it, in each run: the greatest while it waits and nobody touches it, "
+        "and when it felt the person. Between them is its threshold, that of sec. 4.1.2."
     )
     axes = {"xlabel": "speed of the gripper (m/s)", "xlim": (0.0, None)}
     return strips(folder / "margins", caption, cases, axes)

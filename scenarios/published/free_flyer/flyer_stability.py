@@ -132,9 +132,9 @@ class FlyerStability(PublishedExperiment):
                     "not from, ms": f"{1e3 * min(unrest):.0f}" if unrest else "none",
                 })  # fmt: skip
         note = (
-            "Delay of the thrust's command that the loop tolerates where all units step in parallel: by the poles of "
-            f"the controller's own loop, less {_COUPLING_DELAYS} communication steps, and by whether the robot comes "
-            "to rest after a twist. Negative: not without delay either."
+            "Delay of the thrust's command that the loop tolerates where all units step in parallel. It is found by "
+            f"the poles of the controller's own loop, less {_COUPLING_DELAYS} communication steps, and by whether the "
+            "robot comes to rest after a twist. Negative: not without delay either."
         )
         return [table_of("Stability by step and delay", rows, note)]
 
@@ -143,8 +143,8 @@ class FlyerStability(PublishedExperiment):
         found = _runs(table)
         panels = [_panel(found, loop) for loop in _LOOPS if any(of[:2] == loop for of in found)]
         caption = (
-            "Whether the robot comes to rest after a twist where all units step in parallel, by communication step and "
-            "delay of the thrust, and where the largest pole of the controller's own loop is on the unit circle."
+            "Whether the robot comes to rest after a twist where all units step in parallel, by communication step "
+            "and delay of the thrust. The line: the largest pole of the controller's own loop is on the unit circle."
         )
         rows = (len(panels) + 1) // 2
         return drawn(folder / "stability", caption, panels, 2, size=(9.0, 0.6 + 2.9 * rows))

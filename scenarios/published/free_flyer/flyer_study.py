@@ -98,9 +98,9 @@ class FlyerStudy(PublishedExperiment):
     """Ten simulated participants in three tasks with two behaviours, 200 trials each, beside the thesis's 20.
 
     No person took part. Participants differ in skill, effort, reach, tremor, error of depth and delay, drawn from
-    ranges that are assumed, not fitted; what people felt, the thesis's statements S1 to S3, cannot be simulated.
-    Besides, persons who differ in skill alone show how failures grow as it falls. Trials of both behaviours share
-    their random numbers. The quick plan has four trials of each skill's extremes.
+    ranges that are assumed, not fitted. What people felt, the thesis's statements S1 to S3, cannot be simulated.
+    Besides, persons who differ in skill alone show how failures grow as it falls. Trials of both behaviours share their
+    random numbers. The quick plan has four trials of each skill's extremes.
     """
 
     name: ClassVar[str] = "flyer-study"

@@ -85,8 +85,8 @@ class Helix1(PublishedExperiment):
     """Three step sizes, four places, two runs each, with the thesis's settings; and the same with ours beside it.
 
     The claims are judged on the runs with the thesis's settings. The control period is what the thesis's loop took at
-    each step size. Besides, at the smallest step size, whose times the thesis has widely spread, one thing is wrong at
-    a time; and on an arm that is fitted to fig. 9 all step sizes are tried again. The quick plan is a run with the
+    each step size. At the smallest step size, whose times the thesis has widely spread, there are runs with one thing
+    wrong at a time. On an arm that is fitted to fig. 9 all step sizes are tried again. The quick plan is a run with the
     thesis's settings at each of three places: three minutes on two cores.
     """
 

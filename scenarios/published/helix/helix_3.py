@@ -69,10 +69,9 @@ class UseCaseRuns:
 class Helix3(PublishedExperiment):
     """Eight use cases at the first experiment's four places, with the thesis's settings; and the same with ours.
 
-    The thesis states the step size and the number of runs; ours are at the scenario's own step size and period. That
-    the hand was at the places of the first experiment, where the bowl stood and how large it was, and that the error
-    at which the gripper opens is that at which it closes, is assumed. The quick plan is a run with either settings at
-    one place.
+    The thesis states the step size and the number of runs; ours are at the scenario's own step size and period. Assumed
+    are the hand's places, those of the first experiment, and the bowl's place and size. So is the error at which the
+    gripper opens: that at which it closes. The quick plan is a run with either settings at one place.
     """
 
     name: ClassVar[str] = "helix-3"

@@ -117,9 +117,9 @@ class HelixDisturbances(PublishedExperiment):
                     "failed because",
                 ],
                 rows=rows,
-                note="All at the same places, with the same seeds. Distances are between gripper and ball "
-                "when the gripper begins to close and at the end, by ground truth, median and in brackets the largest, "
-                "of the handovers that succeeded; steps are control steps until the gripper begins to close.",
+                note="All at the same places, with the same seeds. Distances are between gripper and ball when the "
+                "gripper begins to close and at the end, by ground truth. They are medians of the handovers that "
+                "succeeded, with the largest in brackets. Steps are control steps until the gripper begins to close.",
             )
         ]
 

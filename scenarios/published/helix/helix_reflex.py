@@ -53,8 +53,8 @@ _MIN_PAIRS = next(n for n in range(1, 64) if 2.0 ** (1 - n) < LEVEL)
 class HelixReflex(PublishedExperiment):
     """Forty places with a seed each, each with and without the reflex and with cameras free and covered, fast arm.
 
-    With cameras covered, besides, where something is not as the reflex expects it: it has the simulator's form of
-    fingers and beams, and off its defaults only that each sensor's gain, range and direction are a little off.
+    With cameras covered, there are runs besides where something is not as the reflex expects it. The reflex has the
+    simulator's form of fingers and beams; by default only each sensor's gain, range and direction are a little off.
 
     Nobody has published such a grasp: all claims are this project's own. The quick plan is two of the places.
     """
@@ -108,9 +108,9 @@ class HelixReflex(PublishedExperiment):
                     for c in CAMERAS
                     for r in (True, False)
                 ],
-                "Medians, with intervals by bootstrap, of the runs in which the gripper closed. They are the ball's "
-                "offset beside and along the gripper's axis as it began to close, by ground truth, and the "
-                f"controller's error of that; then the offset beside the axis as the ball left the hand. {tests}",
+                "Medians, with intervals by bootstrap, of the runs in which the gripper closed. First comes the "
+                "ball's offset beside and along the gripper's axis as it began to close, by ground truth, and the "
+                f"controller's error of it. Then comes the offset beside the axis as the ball left the hand. {tests}",
             ),
             table_of(
                 "A model that is wrong",
@@ -178,8 +178,8 @@ def _centres(claim: str, of_pairs: Sequence[tuple[Row, Row]]) -> Claim:
     return says.judged(
         f"{medians[0]:.1f} mm without, {medians[1]:.1f} mm with it, in the median",
         test.p < LEVEL and test.difference < 0.0,
-        f"Wilcoxon's signed-rank test, two-sided, of {counted(len(d), 'pair')} in which the gripper closed both times "
-        f"rejects that nothing changes (p = {format_p_value(test.p)}) and the median of the differences is below 0",
+        "the median of the differences is below 0 and Wilcoxon's signed-rank test, two-sided, rejects that nothing "
+        f"changes: p = {format_p_value(test.p)} of {counted(len(d), 'pair')} in which the gripper closed both times",
         f"The interval is that median's. Of {counted(len(of_pairs), 'pair')} the others say nothing here.",
         enough=len(d) >= _MIN_PAIRS,
         interval=test.interval,

@@ -94,9 +94,9 @@ class HelixWorkspace(PublishedExperiment):
             axes = {"title": title, "xlabel": f"{name} (m)", "ylabel": "z (m)", "aspect": "equal"}
             panels.append(Panel(marks, axes))
         caption = (
-            "Places of the ball in two upright planes through the arm's axis, as in [Vervloet2025] fig. 14: where the "
-            f"gripper settles within {_SETTLED} with exact measurements, and how many cameras see ball and markers "
-            "whole."
+            "Places of the ball in two upright planes through the arm's axis, as in [Vervloet2025] fig. 14. Marks say "
+            f"where the gripper settles within {_SETTLED} with exact measurements; colours, how many cameras see ball "
+            "and markers whole."
         )
         return drawn(folder / "workspace", caption, panels if rows else [], 2, size=(8.0, 3.7))
 

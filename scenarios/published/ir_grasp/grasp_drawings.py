@@ -206,7 +206,7 @@ def draw_sequences(rows: Sequence[Row], runs: Path, folder: Path) -> Figure | No
             panels[n * len(columns)].set_ylabel(f"{'perturbed' if row['perturbed'] else 'nominal'}\ny (mm)")
     caption = (
         "Two IR-guided grasps of the baby cup in configuration (a), nominal and perturbed, in moments as in [Luberto] "
-        "fig. 11, from above; beams are solid as far as they meet the object within the range."
+        "fig. 11, from above. Beams are solid as far as they meet the object within the range."
     )
     return Figure("sequences", caption)
 

@@ -158,7 +158,7 @@ def judge_descents(descents: Sequence[Descent], perturbed: bool) -> Claim:
     return says.judged(
         f"from {first:.0f} to {last:.0f} mm (medians); it did not fall in {format_rate(rose, n)}",
         interval.high < FEW,
-        f"the interval (Clopper-Pearson) of how often it does not fall lies below {format_share(FEW)}, of the runs "
+        f"the interval (Clopper-Pearson) of how often it does not fall lies below {format_share(FEW)}. Runs count "
         "that made a step and saw the object with thumb and ring at their end",
         f"Left out are {len(descents) - n} of {counted(len(descents), 'run')}.",
         runs=(n, min_trials_for(FEW)),
@@ -204,7 +204,7 @@ def _draw_descents(runs: IrTableRuns, perturbed: bool, folders: Path, folder: Pa
         below.append(Panel([*norms, *key], {"ylabel": "norm, thumb and ring (mm)", "ylim": (0, 92), **axes}))
     caption = (
         f"Distances by the sensors and the norm of the residual in {POSES[perturbed]} poses, as in [Luberto] fig. "
-        f"{_NUMBERS[perturbed]}: each run thin, the median thick, as far as half of the runs go; nothing is drawn "
+        f"{_NUMBERS[perturbed]}. Each run is thin, the median thick, as far as half of the runs go. Nothing is drawn "
         "where a finger sees nothing. Squares: table II, where the paper's runs ended (the norm follows from it)."
     )
     return drawn(folder / f"convergence_{POSES[perturbed]}", caption, [*above, *below], 3, size=(10.0, 5.6))

@@ -52,11 +52,11 @@ class IrLimits(PublishedExperiment):
     """The hand is disturbed in one way at a time, more and more, and meets each scene by several ways to grasp.
 
     Three ways use the sensors: the reflex, the same without touch where fingertips meet objects, and, where sensors are
-    at fault, the paper's algorithm. Five do not: everywhere going 35 or 55 mm ahead, going 100 mm ahead while
-    slowly closing, and that until the joints feel a contact; closing at once where objects come nearer. Each level
-    has three scenes of each of five objects, the table's, or discs and bars of five masses; seven objects that were
-    kept from all tuning join them where objects are carried, and where light or sensors differ. Nothing was tuned
-    with a seed of this campaign.
+    at fault, the paper's algorithm. Five do not. Everywhere these are going 35 or 55 mm ahead, going 100 mm ahead while
+    slowly closing, and that until the joints feel a contact. Where objects come nearer, closing at once joins them.
+    Each level has three scenes of each of five objects: the table's, or discs and bars of five masses. Seven objects
+    that were kept from all tuning join them where objects are carried, and where light or sensors differ. Nothing was
+    tuned with a seed of this campaign.
     """
 
     name: ClassVar[str] = "ir-limits"
@@ -195,8 +195,8 @@ def _no_worse(sentence: str, printed: str, held: Sequence[float], started: Seque
 
 def _worth(runs: LimitRuns) -> Claim:
     says = Statement(
-        f"On at least {_MIN_AXES} axes the reflex holds {100 * WORTH:g} percentage points more of the objects than the "
-        f"best way that does not look{_unpushed(runs)}."
+        f"On at least {_MIN_AXES} axes the reflex holds {100 * WORTH:g} points more, in per cent of the objects, than "
+        f"the best way that does not look{_unpushed(runs)}."
     )
     compared = runs.compared(REFLEX, _WITHOUT)
     if not compared:
@@ -205,8 +205,8 @@ def _worth(runs: LimitRuns) -> Claim:
     return says.judged(
         f"on {len(worth)} of {len(compared)}" + "".join(f"; {c.axis.title} ({100 * c.gain:+.0f})" for c in worth),
         len(worth) >= _MIN_AXES,
-        "on so many axes the difference is as large, of all levels beyond the start, and the exact sign-flip test over "
-        f"scenes, corrected by Holm over the axes, rejects at {format_share(LEVEL)}",
+        "on so many axes the difference is as large, of all levels beyond the start. Besides, the exact sign-flip "
+        f"test over scenes, corrected by Holm over the axes, must reject at {format_share(LEVEL)}",
         f"The best of the others is that which held most. It takes {_MIN_RUNS} runs of each axis.",
         enough=all(c.first[1] >= _MIN_RUNS for c in compared),
     )

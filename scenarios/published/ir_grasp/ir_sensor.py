@@ -124,9 +124,9 @@ class IrSensorCurve(PublishedExperiment):
             table_of(
                 "Sensors whose constants are off",
                 [_spread(tolerance, fits) for tolerance, fits in off.items()],
-                "Largest deviation of each fitted constant from its mean over the sensors, and of the sensors' curves "
-                "from the one that the controller has for all, at readings of 100 to 3000, before a face of "
-                "reflectivity 1.",
+                "Largest deviation of each fitted constant from its mean over the sensors; and of the sensors' curves "
+                "from the controller's one curve. The curves are compared at readings of 100 to 3000, before a face "
+                "of reflectivity 1.",
             ),
             table_of(
                 "Distance by the controller's one curve (mm)",

@@ -202,8 +202,8 @@ class IrTable(PublishedExperiment):
                    "stated way without looking and close, are a control that the paper does not have.",
                    [_panel_of_rates(found, p) for p in POSES], 2, size=(8.0, 3.8)),
             *drawn(folder / "final_distances", "Distances between fingertips and object at the last step of the "
-                   "IR-guided grasp: points are our runs, as the sensors measure them (none where a finger sees "
-                   "nothing), squares the figures of [Luberto] table II. Thumb and ring enter the cost.",
+                   "IR-guided grasp. Points are our runs, as the sensors measure them (none where a finger sees "
+                   "nothing); squares are the values of [Luberto] table II. Thumb and ring enter the cost.",
                    [_panel_of_distances(found, p) for p in POSES], 2, size=(8.0, 4.0)),
         ]  # fmt: skip
 

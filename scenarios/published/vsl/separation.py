@@ -78,7 +78,7 @@ def separation_claim(claim: str, where: str, published: str, comparisons: Sequen
     if all(c.paired for c in comparisons):
         rule = "in each comparison and run the one error is less than the other"
     else:
-        p = f"; by noise alone {n} of each part so with p = {format_p_value(p_value_of_separation(n))}"
+        p = f". By noise alone {n} of each would be apart so with p = {format_p_value(p_value_of_separation(n))}"
         rule = f"in each comparison each run of the one has less error than each of the other{p}"
     more = f"; and {len(failing) - _NAMED} more" if len(failing) > _NAMED else ""
     named = "; ".join(f"{c.label} ({1000 * c.margin:+.2f} mm)" for c in failing[:_NAMED])

@@ -114,8 +114,8 @@ _STROKES: tuple[Any, ...] = ("-", "--", ":", "-.")
 class Vsl2(PublishedExperiment):
     """The curve with 25 g at 1.5 bar and with 75 g at 0.5 bar, five times each, by rigid kinematics and by corrections.
 
-    Corrections are those of cubic polynomials, the default, of a small network and of a beam of four fitted numbers,
-    which ship, and of the paper's network if `take_model` was given the file of one. Polynomials are tried with
+    Corrections are those of cubic polynomials, the default, of a small network, and of a beam of four fitted numbers.
+    These ship; the paper's network is tried if `take_model` was given the file of one. Polynomials are tried with
     feedback, too, by the tracker or by an IMU a link. Besides, the arm of rigid links goes by rigid kinematics, with
     joints as stiff as assumed and stiffer. Corrections are tried on the arm that they were learned from, and on others.
     The quick plan has each case once by rigid kinematics and by polynomials, on the arm that was learned from and on
@@ -233,10 +233,11 @@ class Vsl2(PublishedExperiment):
         arms = [_panel_of_arms(found, case) for case in CASES]
         return [
             *drawn(folder / "estimates", "Where the tip is taken to be as it is commanded along the curve by rigid "
-                   "kinematics, like [Gandarias2020] fig. 6: means of the runs with bands of their standard deviation. "
-                   "Equal scales.", estimates, 2, size=(9.0, 4.2)),
-            *drawn(folder / "compensated", "The curve in a single run of each, like [Gandarias2020] fig. 7(a): the tip "
-                   "by the tracker, and where the compensated command would put the tip of a rigid arm. Equal scales.",
+                   "kinematics, like [Gandarias2020] fig. 6. Means of the runs with bands of their standard "
+                   "deviation. Equal scales.", estimates, 2, size=(9.0, 4.2)),
+            *drawn(folder / "compensated", "The curve in a single run of each, like [Gandarias2020] fig. 7(a). Shown "
+                   "are the tip by the tracker, and where the compensated command would put the tip of a rigid arm. "
+                   "Equal scales.",
                    compensated, 2, size=(9.0, 4.2)),
             *drawn(folder / "errors", "Distances of the tip from the desired points of the curve, like [Gandarias2020] "
                    "fig. 7(b), of all runs: 25th to 75th percentile (box), range, median (line) and mean (dot).",
