@@ -52,7 +52,7 @@ def _wanted_platforms() -> tuple[str, ...]:
 
 
 def _platform_tag(default: str) -> str:
-    """Return the tag of the oldest system that the compiled files run on, as zig was told; else the default."""
+    """Return the tag of the oldest system that the compiled files run on, as given to zig; else the default."""
     if _platform() not in TARGETS:
         return default
     architecture, _, system = _platform().partition("-")

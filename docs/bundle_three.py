@@ -38,8 +38,8 @@ def main() -> None:
         subprocess.run(run, cwd=there, check=True)
         bundle = ["npx", "esbuild", "entry.js", "--bundle", "--minify", "--format=iife", "--global-name=THREE"]
         subprocess.run([*bundle, "--legal-comments=none", "--outfile=three.min.js"], cwd=there, check=True)
-        told = f"/* three.js {THREE}, MIT licence: see three.LICENSE.txt. The parts that our scripts use. */\n"
-        (scene / "three.min.js").write_text(told + (there / "three.min.js").read_text(encoding="utf-8"), "utf-8")
+        notice = f"/* three.js {THREE}, MIT licence: see three.LICENSE.txt. The parts that our scripts use. */\n"
+        (scene / "three.min.js").write_text(notice + (there / "three.min.js").read_text(encoding="utf-8"), "utf-8")
         shutil.copyfile(there / "node_modules" / "three" / "LICENSE", scene / "three.LICENSE.txt")
 
 

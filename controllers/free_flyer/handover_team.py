@@ -122,7 +122,7 @@ class Params(handover_parameters.Params):
     def _beside(self, name: str, i: int) -> np.ndarray[Any, np.dtype[np.float64]]:
         q = getattr(self, name)
         if not 1e-6 < np.linalg.norm(q) < np.inf:
-            return np.zeros(3)  # told as a fault
+            return np.zeros(3)  # reported as a fault
         return np.array(rotate(rotation_matrix(unit_quaternion(q, _NAME, name)), self.offsets[i]))
 
 

@@ -2,7 +2,7 @@
 
 It is what learns least: three stiffnesses, and for commands the servos' droop. Weights and lengths are as a pair of
 scales and a ruler give them; the load follows from the currents of joints 2 and 3. Law and weights are those of the
-unit `VslArm`, so that on it a beam errs less than it would on a real arm, of which no law is known exactly.
+unit `VslArm`, so its errors there are smaller than on a real arm, of which no law is known exactly.
 """
 
 import math

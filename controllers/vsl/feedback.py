@@ -268,10 +268,10 @@ class VibrationDamping:
     the joints yield to it at K_D times the bending, as a damper in series does.
 
     Without friction compensation K_D must be 0: smoothed currents lag behind the posture, and what they lack is taken
-    for a swing. On the curve with 50 g, at 0.1 and 0.2 m/s, the tip errs by 3.1 and 4.4 mm without damping, by 5.1 and
-    6.7 mm with K_D = 4 (at 0.1 m/s by 2.4 and 3.9 mm on an arm without friction, too; by 3.8 and 7.3 mm with lags of
-    1 s), and by 3.0 and 4.3 mm with what is commanded ahead alone. With friction compensation it errs by 1.4 and 3.0
-    mm, and by 1.2 and 2.2 mm with both.
+    for a swing. On the curve with 50 g, at 0.1 and 0.2 m/s, the error of the tip is 3.1 and 4.4 mm without damping, 5.1
+    and 6.7 mm with K_D = 4 (at 0.1 m/s 2.4 and 3.9 mm on an arm without friction, too; 3.8 and 7.3 mm with lags of 1
+    s), and 3.0 and 4.3 mm with what is commanded ahead alone. With friction compensation it is 1.4 and 3.0 mm, and
+    1.2 and 2.2 mm with both.
 
     Args:
         model: what corrects.

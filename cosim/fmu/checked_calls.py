@@ -173,7 +173,7 @@ class CheckedCalls:
             self._check(self._prefix + name, status)
 
     def _check(self, call: str, status: int, failing: str = "") -> None:
-        """Count a Warning; raise a failure of a call, as one that is told as `failing`."""
+        """Count a Warning; raise a failure of a call, reported as `failing`."""
         if status == _WARNING:
             self._warnings.add(call, self.time)
         elif status not in SUCCEEDED:

@@ -239,7 +239,7 @@ class UnitHung(UnitFailure):
 
 
 class EndOfProcess(UnitFailure):
-    """What ended a unit's process, told by what is known of the process alone; `status` says how."""
+    """What ended a unit's process, as far as the process alone shows; `status` says how."""
 
     @property
     def message(self) -> str:

@@ -1,4 +1,4 @@
-"""Where units' libraries lie in memory, so that a crash in a thread of their own can be told of the unit.
+"""Where units' libraries lie in memory, so that a crash in a thread of their own is attributed to the unit.
 
 The process that loads units notes this for the one that survives it (`note_libraries`); that asks by the address of the
 instruction which crashed (`units_at`).

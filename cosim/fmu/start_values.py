@@ -1,4 +1,4 @@
-"""Start values as numbers; those lost as a unit enters initialization mode are set there again, or told of.
+"""Start values as numbers; those lost as a unit enters initialization mode are set there again, or reported.
 
 Both standards let parameters and start values be set before initialization mode and in it (FMI 2.0.4, sec. 4.2.4; FMI
 3.0, sec. 2.3.2 and 2.3.3). Some units set all of them back as the experiment is set up.

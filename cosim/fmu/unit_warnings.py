@@ -1,7 +1,7 @@
 """The calls of one unit that answered Warning: how many, from when on, and what the unit said of it.
 
 Warning is a success: "things are not quite right, but the computation can continue" (FMI 2.0.4, sec. 2.1.3; FMI 3.0,
-sec. 2.2.4). So a run goes on, and who looks at its results is told at its end. Calls that the compiled plan or the
+sec. 2.2.4). So a run goes on, and the warnings are reported at its end. Calls that the compiled plan or the
 process of an isolated unit makes are counted there and added here when somebody asks.
 """
 
@@ -10,7 +10,7 @@ import math
 from typing import TypedDict
 
 _MAX_MESSAGE = 200
-"""Characters of a message that are told."""
+"""Characters of a message that are reported."""
 
 
 class WarningData(TypedDict):
@@ -40,7 +40,7 @@ class UnitWarnings:
         self.first = min(self.first, t)
 
     def note_message(self, message: str) -> None:
-        """Keep what the unit has logged with the status Warning; the last of it is told, in one line."""
+        """Keep what the unit has logged with the status Warning; the last one is reported, in one line."""
         self._message = message
 
     def add_all(self, data: WarningData) -> None:

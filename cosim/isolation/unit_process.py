@@ -1,4 +1,4 @@
-"""The process of an isolated unit: started with memory that it shares with this one, told what to load, ended.
+"""The process of an isolated unit: its start with shared memory, its end.
 
 The calls themselves are made in C, by the library `proxy`, whose functions have the names of both standards.
 """
@@ -28,7 +28,7 @@ _SIZE = 2**32 if sys.platform == "linux" else 2**28
 _SPIN = 50
 """Microseconds for which a side looks again and again before it sleeps, which takes longer than that to end."""
 _PATIENCE = 5.0
-"""Seconds that a process has to end after it was told to."""
+"""Seconds that a process has to end after it was asked to."""
 
 _Sockets = tuple[socket.socket | None, socket.socket | None]
 

@@ -189,7 +189,7 @@ def remove_checkpoint(path: Path) -> None:
 
 @dataclass(frozen=True)
 class _Format:
-    """By which other versions are told from damage."""
+    """By which other versions are distinguished from damage."""
 
     format: int
 

@@ -102,7 +102,7 @@ class SspPart:
     def __init__(self, path: Path, member: str, content: bytes, wanted: str, of: "SspPart | None" = None) -> None:
         self.path, self.member = path, member
         self.unsupported = list[str]() if of is None else of.unsupported
-        """What was left out, all of it a fault: reading goes on, so that it is told with all others."""
+        """What was left out, all of it a fault: reading goes on, so that it is reported with all others."""
         self.tolerated = list[str]() if of is None else of.tolerated
         """What is not as it should be and does not matter."""
         try:

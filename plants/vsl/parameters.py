@@ -68,7 +68,7 @@ class Link(enum.IntEnum):
 class Params:
     """Dimensions, stiffness, weights and sensors; assumed, but for the kinds of motor, sensor and link.
 
-    The values are chosen so that the tip of the arm errs by about what [Gandarias2020] fig. 5 shows.
+    The values are chosen so that the error of the arm's tip is about what [Gandarias2020] fig. 5 shows.
     """
 
     motion: Motion = parameter(

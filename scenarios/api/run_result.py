@@ -57,7 +57,7 @@ class Quantity(float):
 
 
 class Metrics(dict[str, Quantity]):
-    """Figures of merit by name; one that is not there is told with the nearest names."""
+    """Figures of merit by name; the error for an unknown one has the nearest names."""
 
     def __missing__(self, name: str) -> Quantity:
         """Raise KeyError."""

@@ -104,7 +104,7 @@ class ConfigFile:
 
 
 class ConfiguredCommand(HeadedCommand):
-    """A command with `--config`, see `config_option`; what cannot be run is told with the name of the file."""
+    """A command with `--config`, see `config_option`; what cannot be run is refused with the name of the file."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Parse the command line and add what the file gives."""

@@ -79,7 +79,7 @@ def is_terminal(stream: TextIO) -> bool:
 
 
 LOG_LEVELS = ("debug", "info", "warning", "error")
-"""From which level on logs can be told, as `logging_to_standard_error` takes it."""
+"""From which level on logs can be shown, as `logging_to_standard_error` takes it."""
 
 
 @contextmanager
@@ -87,7 +87,7 @@ def logging_to_standard_error(level: str | None) -> Generator[None, None, None]:
     """Tell of units' logs and of the master's progress on standard error, from a level on.
 
     `debug` has all that units log, by all their categories, `info` the master's progress. None leaves all as it is:
-    the master's warnings are told, and of a unit's log what belongs to its failure.
+    the master's warnings are shown, and of a unit's log what belongs to its failure.
     """
     logger, handler = logging.getLogger(__name__.partition(".")[0]), _ToStandardError()
     if level is None:

@@ -267,7 +267,7 @@ def _conclude(
 def _outcome(
     task: Task, evaluator: Evaluator, failure: UnitFailure | None, interrupted: bool, master: Master
 ) -> Outcome:
-    """Return the verdict; a run that ended before its evaluation was over, as it was told to, has not succeeded."""
+    """Return the verdict; a run that ended before its evaluation was over, on request, has not succeeded."""
     seen = evaluator.outcome()
     if failure is not None:
         return replace(seen, success=False, reason=failure_reason(failure))

@@ -224,7 +224,7 @@ class Replay(Checked):
             (n, 3); None: everything that is drawn.
         weightless: whether there is neither up nor down, so that stars are around and no floor is below.
         floor: height of the floor, m; None: below all that is drawn.
-        follow: label of what the view can be told to follow; "" for nothing.
+        follow: label of what the view can follow; "" for nothing.
         person_view: what the person in it sees who takes part; None where there is none.
     """
 

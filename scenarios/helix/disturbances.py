@@ -1,4 +1,4 @@
-"""What may be amiss in a Helix handover: parameters of the scenario, and what they set on the units.
+"""What may be wrong in a Helix handover: parameters of the scenario, and what they set on the units.
 
 The thesis has none of them as a variable: all are this project's own. At the defaults the plant is as its units have
 it, but for the clicks of the calibration.
@@ -31,7 +31,7 @@ class Cover(enum.IntEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class Disturbances:
-    """What may be amiss with arm, hand, cameras and controller, each by itself."""
+    """What may be wrong with arm, hand, cameras and controller, each by itself."""
 
     arm_stiffness: Number = parameter(
         1.0,

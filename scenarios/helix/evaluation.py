@@ -62,7 +62,7 @@ _GRIP_CLOSED = 0.999
 """Closure at which a gripper has closed, of a controller that does not say so."""
 
 _RECENT = 10.0
-"""Time before the end for which a run that ran out of time is told how near the arm came, s: once or twice as long."""
+"""Time before the end whose least distance is reported where time ran out, s: once or twice as long."""
 
 _BROUGHT = 0.01
 """Distance of ball and closing gripper from which a success tells that the person brought the ball, m."""

@@ -37,7 +37,7 @@ _PAPER = "helix"
 def published_values(p: Parameters) -> Sequence[PublishedValue]:
     """Return the times and steps of table 1 for its step sizes, and for the smallest of them the model's error.
 
-    Nothing for other step sizes, other places of ball or cameras, other markers, or where anything is amiss.
+    Nothing for other step sizes, other places of ball or cameras, other markers, or where anything is disturbed.
     """
     published, default = paper_values(_PAPER, "experiment"), Parameters()
     matches = np.flatnonzero(np.isclose(published["alpha"], p.alpha))

@@ -174,7 +174,7 @@ class Task:
 
 @dataclass(frozen=True, kw_only=True)
 class Parameters(Disturbances, Task):
-    """One handover, and what is amiss in it."""
+    """One handover, and what is wrong in it."""
 
     @property
     def p_WO(self) -> Floats:

@@ -150,7 +150,7 @@ class SensorEvaluator(Evaluator):
         return self._t >= self._arrived + _AT_REST
 
     def outcome(self) -> Outcome:
-        """Return whether the sensor came to the face without a touch, and how the curve errs."""
+        """Return whether the sensor came to the face without a touch, and the errors of the curve."""
         metrics = {
             "last_distance": Metric(self._distance, "m", "sensor to face along the beam at the end"),
             "first_seen": Metric(self._first_seen, "m", "distance at which the curve first put the face in range"),

@@ -20,7 +20,7 @@ class _Held:
 
 
 class BodyPushes:
-    """The pushes of all pages, one each; of two on one body the one that was told last acts.
+    """The pushes of all pages, one each; of two on one body the last one acts.
 
     Args:
         silence: how long a page may be silent before its push is released, s.
@@ -28,7 +28,7 @@ class BodyPushes:
 
     def __init__(self, silence: float = SILENCE) -> None:
         self._silence = silence
-        self._held: dict[object, _Held] = {}  # in the order in which they were told
+        self._held: dict[object, _Held] = {}  # in the order in which they came
 
     def __contains__(self, page: object) -> bool:
         """Return whether a page pushes."""

@@ -30,7 +30,7 @@ LONGEST_REASON = 123
 PATIENCE = 2.0
 """How long the other end may take to receive a message, s."""
 REFUSAL_PERIOD = 0.5
-"""Time between two refusals for one reason that a device is told, s: a flood is not answered with another one."""
+"""Time between two refusals for one reason that a device gets, s: a flood is not answered with another one."""
 MOST_CONNECTIONS = 128
 """Connections at a time: where a process has no file left for one more, asyncio logs each attempt without end."""
 BACKLOG = 32
@@ -123,7 +123,7 @@ async def close(socket: WebSocket, code: int, reason: str = "", patience: float 
     Args:
         socket: the connection.
         code: of WebSocket.
-        reason: as the other end is told.
+        reason: as the other end gets it.
         patience: how long the other end may take to receive what was sent before, s.
     """
     with contextlib.suppress(WebSocketDisconnect, RuntimeError, TimeoutError, asyncio.TimeoutError):
@@ -151,7 +151,7 @@ class MessageRate:
 
 
 class RefusalTimer:
-    """Says which refusals a device is told: two a second at most of those for one reason.
+    """Says which refusals a device gets: two a second at most of those for one reason.
 
     Args:
         clock: s.
@@ -162,7 +162,7 @@ class RefusalTimer:
         self._clock = clock
 
     def is_due(self, kind: str) -> bool:
-        """Return whether a refusal of this kind is told now; it then counts as told."""
+        """Return whether a refusal of this kind is sent now; it then counts as sent."""
         now = self._clock()
         if now - self._last.get(kind, -REFUSAL_PERIOD) < REFUSAL_PERIOD:
             return False

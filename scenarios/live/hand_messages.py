@@ -15,7 +15,7 @@ is a JSON object:
 
 The server answers first with `{"hand": {...}}`, where the hand is wanted as it stands, in the same members, and how far
 it goes (`centre`, `radius`, m); afterwards only with `{"refused": "why"}`, and the run goes on with the sample before.
-Of refusals for one reason, a device is told two a second at most; a live run's folder counts all, in inputs.json.
+Of refusals for one reason, a device gets two a second at most; a live run's folder counts all, in inputs.json.
 Where no hand of the run can be led, the first answer is `{"refused": "why"}`, and the connection ends with 1008; where
 no run has begun yet, with 1013: it may be tried again.
 Whoever connects first leads the hand until the connection ends. A sample has 2000 characters at most. A message above

@@ -38,7 +38,7 @@ _IS_LED = 'another page or tracker leads the hand; a page leaves it to "a tracke
 
 
 class HandSeat:
-    """Takes the samples of one device at a time; others are told to wait.
+    """Takes the samples of one device at a time; others have to wait.
 
     Args:
         led: the hand.

@@ -1,4 +1,4 @@
-"""The live page as HTML, and what it is told of a run that begins."""
+"""The live page as HTML, and what it gets of a run that begins."""
 
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -23,7 +23,7 @@ def figure_json(plot: TimePlot, time: Floats) -> str:
 
 
 def begun_content(shown: ShownRun) -> dict[str, Any]:
-    """Return what a page is told when a run begins."""
+    """Return what a page gets when a run begins."""
     scene = shown.scene
     assert scene is not None
     surroundings = {name: str(html) for name, html in scene.surroundings().items()}
@@ -35,7 +35,7 @@ def begun_content(shown: ShownRun) -> dict[str, Any]:
 
 
 def hint_content(hint: HandHint) -> dict[str, Any]:
-    """Return what a page is told at an instant to help who leads a hand; see `HandHint`."""
+    """Return what a page gets at an instant, to help who leads a hand; see `HandHint`."""
     goal = None if hint.goal is None else hint.goal.tolist()
     return {**asdict(hint), "p_WH": hint.p_WH.tolist(), "goal": goal}
 

@@ -86,7 +86,7 @@ class LivePage:
         self._viewers = Viewers(self.forget)
         self._pushes = BodyPushes()
         self._size: int | None = None  # how many numbers a frame has
-        self._ended: ShownRun | None = None  # what pages were told the end of
+        self._ended: ShownRun | None = None  # whose end was sent to pages
 
     def routes(self) -> Sequence[BaseRoute]:
         """Return what is served besides the page and its connection: what a webcam needs, where it is offered."""
@@ -177,7 +177,7 @@ class LivePage:
         except InvalidCommand as e:
             await self.send(page, {"refused": str(e)})
             return
-        if command.name != "push":  # which comes thirty times a second, and changes nothing that is told
+        if command.name != "push":  # which comes thirty times a second, and changes nothing that is sent
             await self._tell_states()
 
     async def execute(self, page: WebSocket, command: Command) -> None:

@@ -1,6 +1,6 @@
 """The page of `handover play`: fields for the parameters, a run begun anew when one changes, all runs side by side.
 
-What is refused is told beside its field, and the run under way goes on. A browser may ask for nothing but this page,
+What is refused is shown beside its field, and the run under way goes on. A browser may ask for nothing but this page,
 and for the report of one of the session's runs.
 """
 
@@ -213,7 +213,7 @@ class PlayPage(LivePage):
         while not run.has_ended:
             await asyncio.sleep(_POLL)
         if run.is_refused:
-            # what is wrong with what was changed since then is told besides
+            # what is wrong with what was changed since then is shown besides
             self._faults = {named_in(run.error, self._session.names): without_call(run.error), **self._faults}
             self._runs.remove(run)
             await self.tell(self._about_choice())

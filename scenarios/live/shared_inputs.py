@@ -33,7 +33,7 @@ was read, both in s of the monotonic clock."""
 _MOST_USES = 1 << 14
 """Uses that are kept: of four minutes in steps of 16 ms."""
 _GUARD = 16
-"""Oldest of them that are not told, since the run may be writing over them."""
+"""Oldest of them that are not read, since the run may be writing over them."""
 _TRIES = 1000
 """How often a sample that is being written is read again, until the one before it is used once more."""
 

@@ -27,7 +27,7 @@ class Viewers:
     """The pages that are open.
 
     Args:
-        gone: is told of a page that is open no more.
+        gone: is called with a page that is open no more.
         slowest: how long a page may take to receive a message, s; then its connection is closed, with the reason, so
             that it does not stand still as if nothing happened.
     """

@@ -1,7 +1,7 @@
 """Outputs of a run that are NaN or infinite in its record: which, from when on, and the lines that tell of them.
 
 The master checks what feeds a unit, and a value that is not finite there ends the run. What feeds no unit harms none of
-them: the run goes on, and who looks at its results is told at its end.
+them: the run goes on, and they are reported at its end.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -15,7 +15,7 @@ from handover.cosim.exceptions import counted
 from handover.cosim.system.system import System
 
 MAX_LINES = 5
-"""Outputs that are told a line each; of more there is the number."""
+"""Outputs that are reported in a line each; of more there is the number."""
 
 
 class NotFiniteData(TypedDict):

@@ -1,4 +1,4 @@
-"""What is told of a run's system, whatever the scenario: units and connections, CPU times, memory, iterations.
+"""Facts on a run's system, whatever the scenario: units and connections, CPU times, memory, iterations.
 
 `run.json` keeps the system's units and connections for the report's graph (`describe_system`); `run_metrics` are the
 metrics that every run has.

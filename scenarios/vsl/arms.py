@@ -1,4 +1,4 @@
-"""Arms that differ from the one that the learned model was trained on; the controller is not told how.
+"""Arms that differ from the one that the learned model was trained on; the controller does not know how.
 
 One factor each for all links, gears or joints, and a scatter that is drawn for each of them apart, from a seed of its
 own: the same arm in every run with that seed.

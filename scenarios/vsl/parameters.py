@@ -51,7 +51,7 @@ class Links(enum.IntEnum):
 
 
 class Resolution(enum.IntEnum):
-    """Whether angles and pressures are told and commanded as they are, or as the published robot's electronics can."""
+    """Whether angles and pressures are ideal, or as the published robot's electronics can."""
 
     IDEAL = 0
     ELECTRONICS = 1

@@ -85,7 +85,7 @@ def fixed_value_faults(given: Sequence[str], fixed: Mapping[str, str] = FIXED_VA
 
 
 def sensor_faults(system: System, given: Sequence[str], remedy: str) -> list[str]:
-    """Return which sensors the kinematics are told to look at that nothing is connected to: they would read 0.
+    """Return which sensors the kinematics use that nothing is connected to: they would read 0.
 
     Args:
         system: as it is wired.

@@ -34,7 +34,7 @@ class Errors:
 
 @dataclass(frozen=True, kw_only=True)
 class Residuals:
-    """What is to be learned of measured points, and by how much a model errs on them.
+    """What is to be learned of measured points, and the error of a model on them.
 
     Attributes:
         kinematics: of rigid links, which is corrected.

@@ -1,9 +1,9 @@
 """Terminals of an FMU, from any tool: `terminalsAndIcons/terminalsAndIcons.xml` of FMI 3.0, in FMUs of either version.
 
 The file groups variables, so that tools connect what belongs together. A run that names no terminal does without it, so
-a fault in it keeps no unit from running: it is kept with the terminal, and who would connect that one is told. A system
-connects ports, and scalars `p[1]`, `p[2]`, ... are one array port there; members that are its entries are one member.
-Terminals within a terminal are named `outer.inner`: each has a rule of its own.
+a fault in it keeps no unit from running: it is kept with the terminal, and reported where that one is to be connected.
+A system connects ports, and scalars `p[1]`, `p[2]`, ... are one array port there; members that are its entries are one
+member. Terminals within a terminal are named `outer.inner`: each has a rule of its own.
 """
 
 from collections import defaultdict

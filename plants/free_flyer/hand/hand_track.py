@@ -26,7 +26,7 @@ _NAMED = 3
 _UNIT = 1e-3
 """How far a quaternion's norm may be from 1."""
 _SAME_TIME = 1e-9
-"""Seconds by which a row's time may be later than a time that is told, by rounding, and still be reached."""
+"""Seconds by which a row's time may be later than a given time, by rounding, and still be reached."""
 _ROUNDING = 1e-6
 """Radians by which a joint may be beyond its range, by rounding."""
 
@@ -128,10 +128,10 @@ def _fault_of_header(header: Sequence[str]) -> str:
     if not lacking:
         twice = [name for name in COLUMNS if header.count(name) > 1]
         return f"its first row names {', '.join(twice)} more than once" if twice else ""
-    told = f"its first row must name all of {', '.join(COLUMNS)}, separated by commas"
+    needed = f"its first row must name all of {', '.join(COLUMNS)}, separated by commas"
     if len(lacking) == len(COLUMNS):
-        return f"{told}; it names none of them"
-    return f"{told}; lacking: {', '.join(lacking)}"
+        return f"{needed}; it names none of them"
+    return f"{needed}; lacking: {', '.join(lacking)}"
 
 
 def _numbers(row: Sequence[str], at: Sequence[int]) -> list[float]:

@@ -257,7 +257,7 @@ def _adapt(o: _Options, progress: Progress) -> list[str]:
 
 
 def _seed_of_points(model: VslModel) -> int:
-    """Return the seed of the points that a model, or what it was adapted from, was trained on: 0 if that is not told.
+    """Return the seed of the points that a model, or what it was adapted from, was trained on: 0 if that is unknown.
 
     Points of that seed would be the same again, so that an adaptation would be tested on what the model has seen.
     """

@@ -1,1 +1,1 @@
-"""The commands about units: built, checked, told of, and begun from templates or from a place in a scenario."""
+"""The commands about units: built, checked, described, and begun from templates or from a place in a scenario."""

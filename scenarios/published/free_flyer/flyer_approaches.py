@@ -1,4 +1,4 @@
-"""Approaches to places where nobody is: how safely a robot at rest is told from one that is pulled or pushed."""
+"""Approaches to places where nobody is: how safely a robot at rest differs from one that is pulled or pushed."""
 
 from collections.abc import Sequence
 from fractions import Fraction

@@ -42,7 +42,7 @@ DISTURBANCES = (
     factor_of("mass", "mass_factor", 0.7),
     factor_of("mass", "mass_factor", 1.3),
 )
-"""One at a time. The controllers know neither the delay nor the mass: told of the delay, the rigid impedance control
+"""One at a time. The controllers know neither the delay nor the mass: with the delay known, the rigid impedance control
 rejects it, for its loop is then not stable, and there would be no run to look at."""
 PROPULSIONS = (Propulsion.IDEAL, Propulsion.LIMITED)
 """Without and with limits of each axis."""

@@ -33,7 +33,7 @@ OFFERED_AT = [
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """Something that is amiss.
+    """Something that is wrong.
 
     Attributes:
         what: in words.

@@ -69,16 +69,16 @@ MOVED: Point = {"perturbed": "true"}
 
 @dataclass(frozen=True)
 class Axis:
-    """Something that goes amiss, by levels.
+    """A disturbance, by levels.
 
     Attributes:
         key: a word for it.
         title: what, in words.
-        unit: of the levels as they are told.
+        unit: of the levels as they are printed.
         scale: how many of it one SI unit is.
         levels: in SI units, from the mildest on.
         parameter: what a level sets; {} stands for the level in the values.
-        start: its level where nothing is amiss, for reflectivity about what the objects have; None if that is another
+        start: its level without a disturbance, for reflectivity about what the objects have; None if that is another
             object.
         base: parameters of all its runs.
         scenes: objects.

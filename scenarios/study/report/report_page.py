@@ -161,7 +161,7 @@ def _exclusions_section(analysis: StudyAnalysis, words: Words) -> Section:
 
 
 def _repeated_attempts(analysis: StudyAnalysis, words: Words) -> Markup:
-    """Return which rounds were begun and played again, and why: a crash of the simulation is told, too."""
+    """Return which rounds were begun and played again, and why: a crash of the simulation is shown, too."""
     rows = [
         (a["participant"], str(a["round"]), words.task(a["task"]), a["behaviour"], a["reason"])
         for s in analysis.sessions
@@ -175,7 +175,7 @@ def _repeated_attempts(analysis: StudyAnalysis, words: Words) -> Markup:
 
 
 def _withdrawals(analysis: StudyAnalysis) -> Markup:
-    """Return who withdrew and when; nothing else is told of them."""
+    """Return who withdrew and when; nothing else of them is shown."""
     withdrawals = analysis.study.withdrawals
     if not withdrawals:
         return note("Nobody has withdrawn.")

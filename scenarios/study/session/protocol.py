@@ -259,7 +259,7 @@ class Protocol:
         self.screen = "practising"
 
     def _begin_round(self, _value: Any) -> None:
-        with contextlib.suppress(RecordNotWritten):  # told where the round itself is to be kept
+        with contextlib.suppress(RecordNotWritten):  # reported where the round itself is to be kept
             self._begun.note_begun(self._planned.number)
         self.screen, self._practice_over = "round", False
 

@@ -42,7 +42,7 @@ def who(study: StudyFolder, unfinished: Sequence[SessionFolder]) -> dict[str, An
 
 
 def round_to_play(plan: StudyPlan, planned: Round, text: StudyText) -> dict[str, Any]:
-    """Return what is told of a round: its task, and not the robot's behaviour."""
+    """Return what is shown of a round: its task, and not the robot's behaviour."""
     task = planned.condition.task
     task_texts = {"name": text.task_names[task], "instruction": text.instructions[task]}
     return {**task_texts, "task": task, "round": planned.number, "rounds": plan.rounds}

@@ -48,7 +48,7 @@ async def serve_study(
         out: its folder, new, or one that goes on.
         host: the address on which it listens.
         port: likewise; 0: any that is free.
-        number: the first participant's; None: the next, or, where a session is not complete, whom the page is told.
+        number: the first participant's; None: the next, or, where a session is not complete, whom the page names.
         pace: simulated seconds per second of wall time.
         pilot: whether scripts take part.
         webcam: files by which a webcam leads the hand; None where it is not offered.

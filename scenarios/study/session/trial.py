@@ -40,7 +40,7 @@ _POLL = 0.02
 _PATIENCE = 60.0
 """How long a run may take until its first row, s."""
 _GRACE = 5.0
-"""How long a run may take to end once it is told to, s."""
+"""How long a run may take to end once it is asked to, s."""
 _MOST_STAMPS = 4096
 TARGET, PLUMB = "place to go", "depth"
 """Labels of what the page moves: the place of the device's test, and lines from hand and object down to the floor."""

@@ -29,7 +29,7 @@ _NODES: Floats = np.linspace(-8.0, 8.0, 161)
 where the intercepts' deviation is below 5. Nodes of Gauss and Hermite would have to be moved to each person."""
 _COARSE: Floats = np.linspace(-4.9, 4.9, 29)
 """Of the intercepts beside slopes, and of the slopes below: the same rule, coarser, as there is a product of both; a
-test compares it to the fine one. Slopes are told less sharply by the few ratings of a block."""
+test compares it to the fine one. Slopes are known less sharply from the few ratings of a block."""
 _SLOPES: Floats = np.linspace(-4.5, 4.5, 19)
 _logistic = cast(Callable[[Floats], Floats], expit)
 _TINY = 1e-300
