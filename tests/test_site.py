@@ -155,7 +155,8 @@ def test_each_equation_is_mathml_that_browsers_lay_out():
 
 
 def test_a_sentence_that_is_too_long_is_found_where_code_equations_and_numbered_lists_do_not_count():
-    sentences, words = maker("sentences"), " ".join(["word"] * 39)
+    sentences = maker("sentences")
+    words = " ".join(["word"] * (sentences.MOST_WORDS - 1))
     codes = 60 * "<code class='x'><span>f_G</span></code>, " + "<math><mi>x</mi></math>"
     short = f"<p>{codes} {words}. Another {words}. Why: {', '.join(f'{i} reason of some kind' for i in range(20))}.</p>"
     assert sentences.long_sentences(f"<p>{words} {words}</p><article>{short}</article>") == []
