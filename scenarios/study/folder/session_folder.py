@@ -14,7 +14,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from handover.cosim.typed_data import Count
+from handover.cosim.typed_data import Count, NotNegative
 from handover.scenarios.results.run_folder import (
     InvalidRunFolder,
     check_place,
@@ -89,10 +89,10 @@ class RoundRecord:
     failed_by_rule: bool | None = None
     void: bool = False
     void_reason: str = ""
-    latency_median_ms: float | None = None
-    latency_p95_ms: float | None = None
-    latency_max_ms: float | None = None
-    age_at_use_ms: float | None = None
+    latency_median_ms: NotNegative | None = None
+    latency_p95_ms: NotNegative | None = None
+    latency_max_ms: NotNegative | None = None
+    age_at_use_ms: NotNegative | None = None
     missed_deadlines: Count | None = None
 
 
@@ -144,10 +144,13 @@ class SessionFolder:
         """Return what is known of a round, None if it has not been played to its end.
 
         Raises:
-            InvalidRunFolder: its file is damaged.
+            InvalidRunFolder: its file is damaged, or has ratings that the plan does not allow.
         """
         file = self._file(number)
-        return read_file(file, f"it has no {file.name}", _KeptRound) if file.is_file() else None
+        kept = read_file(file, f"it has no {file.name}", _KeptRound) if file.is_file() else None
+        if kept is not None and kept.answers is not None:
+            _check_kept(file, self._rating_faults(kept.answers))
+        return kept
 
     @property
     def records(self) -> dict[int, RoundRecord]:
@@ -169,7 +172,11 @@ class SessionFolder:
     def questionnaire(self) -> dict[str, str] | None:
         """Answers to the questions after the last round; None if they were not asked yet."""
         file = self.path / "questionnaire.json"
-        return read_file(file, "it has no questionnaire.json", dict[str, str]) if file.exists() else None
+        if not file.exists():
+            return None
+        answers = read_file(file, "it has no questionnaire.json", dict[str, str])
+        _check_kept(file, self._answer_faults(answers))
+        return answers
 
     @property
     def next_round(self) -> Round | None:
@@ -259,12 +266,7 @@ class SessionFolder:
         """
         kept = self._kept(number)
         faults = [] if kept is not None else [f"round {number} has not been played"]
-        faults += [f"{name} is not rated" for name in self.plan.statements if name not in answers]
-        faults += [f"there is no statement {name}" for name in answers if name not in self.plan.statements]
-        low, high = self.plan.scale
-        for name, value in answers.items():
-            if isinstance(value, bool) or value not in self.plan.ratings:
-                faults.append(f"{name} = {value!r}: expected a whole number from {low} to {high}")
+        faults += self._rating_faults(answers)
         if faults or kept is None:
             raise ValueError("; ".join(faults))
         self._keep(number, asdict(kept.record), {name: int(answers[name]) for name in self.plan.statements})
@@ -275,17 +277,29 @@ class SessionFolder:
         Raises:
             ValueError: with all that is wrong with them. RecordNotWritten: they cannot be written.
         """
+        if faults := self._answer_faults(answers):
+            raise ValueError("; ".join(faults))
+        kept = {q.name: str(answers[q.name]) for q in self.plan.questions if answers.get(q.name)}
+        write_whole(self.path / "questionnaire.json", json.dumps(kept, indent=2) + "\n")
+        self.write_tables()
+
+    def _rating_faults(self, answers: Mapping[str, int]) -> list[str]:
+        faults = [f"{name} is not rated" for name in self.plan.statements if name not in answers]
+        faults += [f"there is no statement {name}" for name in answers if name not in self.plan.statements]
+        low, high = self.plan.scale
+        for name, value in answers.items():
+            if isinstance(value, bool) or value not in self.plan.ratings:
+                faults.append(f"{name} = {value!r}: expected a whole number from {low} to {high}")
+        return faults
+
+    def _answer_faults(self, answers: Mapping[str, str]) -> list[str]:
         questions = {q.name: q for q in self.plan.questions}
         faults = [f"there is no question {name}" for name in answers if name not in questions]
         for name, question in questions.items():
             answer = answers.get(name, "")
             if answer and question.choices and answer not in question.choices:
                 faults.append(f"{name} = {answer!r}: expected one of {', '.join(question.choices)}")
-        if faults:
-            raise ValueError("; ".join(faults))
-        kept = {name: str(answers[name]) for name in questions if answers.get(name)}
-        write_whole(self.path / "questionnaire.json", json.dumps(kept, indent=2) + "\n")
-        self.write_tables()
+        return faults
 
     def _keep(self, number: int, record: Mapping[str, Any], answers: Mapping[str, int] | None) -> None:
         content = {"record": record, "answers": answers}
@@ -369,6 +383,11 @@ class SessionFolder:
     def _is_late(self, record: RoundRecord) -> bool | None:
         p95 = record.latency_p95_ms
         return None if p95 is None else p95 > self.plan.latency_limit
+
+
+def _check_kept(file: Path, faults: Sequence[str]) -> None:
+    if faults:
+        raise InvalidRunFolder(file.parent, f"its {file.name} does not fit the plan: {'; '.join(faults)}")
 
 
 def pseudonym_of(number: int) -> str:

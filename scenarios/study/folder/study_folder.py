@@ -47,7 +47,7 @@ class StudyFolder:
             InvalidRunFolder: it is another plan's, or something else. RecordNotWritten: it cannot be written.
         """
         folder = cls(path, plan)
-        if folder._plan_file.is_file():
+        if not _missing_of(path):
             if cls.read(path).plan.source != plan.source:
                 fault = "its study has another plan, plan.toml; name a new folder, or that plan"
                 raise InvalidRunFolder(path, fault)
@@ -68,8 +68,8 @@ class StudyFolder:
             InvalidRunFolder: it is none, its plan is damaged, or folders of its sessions lie elsewhere, by a link.
         """
         file = path / "plan.toml"
-        if not file.is_file():
-            raise InvalidRunFolder(path, "it is not the folder of a study: it has no plan.toml")
+        if missing := _missing_of(path):
+            raise InvalidRunFolder(path, f"it is not the folder of a study: it has no {', '.join(missing)}")
         check_no_links(path, "participants", "participants/P*", "participants/P*/*", "participants/P*/*/*")
         try:
             return cls(path, parse_plan(read_regular(file).decode(), file))
@@ -133,13 +133,16 @@ class StudyFolder:
         """Return a session that has begun.
 
         Raises:
-            InvalidRunFolder: there is none of that number, or its session.json is damaged.
+            InvalidRunFolder: there is none of that number, its session.json is damaged, or the plan does not allow it.
         """
         withdrawal = self.withdrawals.get(number)
         if withdrawal is not None and withdrawal.deleted:
             fault = f"its participant has withdrawn, and what was kept was deleted on {withdrawal.deleted}"
             raise InvalidRunFolder(self.participants / pseudonym_of(number), fault)
-        return SessionFolder.read(self.participants / pseudonym_of(number), self.plan)
+        folder = SessionFolder.read(self.participants / pseudonym_of(number), self.plan)
+        if faults := _faults_of(folder.session, self.plan):
+            raise InvalidRunFolder(folder.path, f"its session.json does not fit the plan: {'; '.join(faults)}")
+        return folder
 
     def begin(self, session: Session) -> "SessionFolder":
         """Write the first file of a session, whose participant has agreed and may take part.
@@ -167,6 +170,8 @@ class StudyFolder:
         return self._write(session)
 
     def _write(self, session: Session) -> "SessionFolder":
+        if missing := _missing_of(self.path):
+            raise InvalidRunFolder(self.path, f"it was removed, or moved: it has no {', '.join(missing)}")
         path = self.participants / session.pseudonym
         data = {
             "participant": session.pseudonym,
@@ -209,6 +214,12 @@ class StudyFolder:
         """
         with folder_held(self.path, "another process carries out its study"):
             yield
+
+
+def _missing_of(path: Path) -> list[str]:
+    """Return what a folder lacks of what every study's has: a plan alone lies in folders of other things, too."""
+    files = [name for name in ("plan.toml", "versions.json") if not (path / name).is_file()]
+    return files + ([] if (path / "participants").is_dir() else ["participants"])
 
 
 def _faults_of(session: Session, plan: StudyPlan) -> list[str]:

@@ -10,12 +10,15 @@ from support.campaigns import campaign_metadata, folder_of, table_of
 from support.commands import refusal
 from support.cosim.native_units import native_fmu
 from support.rewritten_archive import described_otherwise
+from support.scenarios.sample_study import PLAN
 from support.wording import Wording
 
 from handover.cosim.fmu.file.archive import write_archive
 from handover.cosim.ssp.writing import write_ssp
 from handover.cosim.system.system import System
 from handover.fmus.build import cached
+from handover.scenarios.study.folder.study_folder import StudyFolder
+from handover.scenarios.study.plan.plan import default_plan
 
 CALLS = """
 list nothing_like_it
@@ -79,6 +82,7 @@ run missing.ssp
 run broken.ssp
 resume here
 resume nothing
+resume a
 run two.ssp
 run two.ssp --stop 2 --unit a=1 --seed 3
 run two.ssp --stop 2 --start 2
@@ -173,6 +177,11 @@ compare a b --signal scene.yaw
 compare a b --metric mowed
 compare a ran
 compare a b --out a
+study report planned
+study export planned
+study withdraw planned P01
+study serve planned/plan.toml --out planned
+study report study --out study/plan.toml
 """
 
 
@@ -180,7 +189,7 @@ compare a b --out a
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder of files and folders that calls name."""
     place = tmp_path_factory.mktemp("usage")
-    for name in ("here", "ran", "folder.ssp"):
+    for name in ("here", "ran", "folder.ssp", "planned"):
         (place / name).mkdir()
     for name in ("file", "here/mass.fmu", "here/notes.txt"):
         (place / name).touch()
@@ -190,6 +199,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (place / "own_broken.py").write_text("x = 1\ny = 1 / 0\n")
     for name in ("a", "b"):
         folder_of(place / name, campaign_metadata("ir_grasp", [{}]), table_of([{}], moved=[0.1, 0.2]))
+    (place / "planned" / "plan.toml").write_text(default_plan(), encoding="utf-8")
+    StudyFolder.opened(place / "study", PLAN)
     two = System()
     for name in ("left", "right"):
         two.add(name, native_fmu("mass", 2))

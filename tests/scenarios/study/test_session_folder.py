@@ -1,6 +1,7 @@
 """What a session keeps: tables that pandas reads by the codebook, rounds that outlive a kill, and refusals."""
 
 import json
+import shutil
 import signal
 import subprocess
 import sys
@@ -179,6 +180,40 @@ def test_a_folder_of_another_plan_or_of_something_else_is_refused(tmp_path: Path
             act()
         wording.check(refused.value)
     assert StudyFolder.read(out).next_number == 2
+
+
+@pytest.mark.parametrize(("name", "value"), [("language", "xx"), ("device", "feather"), ("consent", False)])
+def test_a_session_that_the_plan_does_not_allow_is_refused(name: str, value: object, tmp_path: Path):
+    file = StudyFolder.opened(tmp_path / "out", PLAN).begin(session(1)).path / "session.json"
+    file.write_text(json.dumps({**json.loads(file.read_text()), name: value}))
+    with pytest.raises(InvalidRunFolder, match="does not fit the plan"):
+        StudyFolder.read(tmp_path / "out").session(1)
+
+
+@pytest.mark.parametrize(
+    ("file", "entries"),
+    [
+        ("rounds/01.json", {"answers": {"S1": 55, "S2": 5, "S3": 5}}),
+        ("rounds/01.json", {"answers": {"S1": 5, "S2": 5}}),
+        ("rounds/01.json", {"answers": {"S1": 5, "S2": 5, "S3": 5, "S4": 5}}),
+        ("questionnaire.json", {"age_group": "200"}),
+        ("questionnaire.json", {"height": "tall"}),
+    ],
+)
+def test_answers_that_the_plan_does_not_allow_are_in_no_table(file: str, entries: dict[str, object], tmp_path: Path):
+    study = write_study(tmp_path / "out", 1, same)
+    place = study.session(1).path / file
+    place.write_text(json.dumps({**json.loads(place.read_text()), **entries}))
+    with pytest.raises(InvalidRunFolder, match="does not fit the plan"):
+        study.write_tables()
+
+
+def test_no_session_begins_in_a_folder_that_was_removed_meanwhile(tmp_path: Path):
+    study = StudyFolder.opened(tmp_path / "out", PLAN)
+    shutil.rmtree(study.path)
+    with pytest.raises(InvalidRunFolder):
+        study.begin(session(1))
+    assert not study.path.exists()
 
 
 @pytest.mark.parametrize("linked", ["participants", "participants/P01", "participants/P01/rounds"])

@@ -7,9 +7,11 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
+from support.scenarios.sample_study import PLAN
 from support.wording import Wording
 
 from handover.scenarios.cli.command import main
+from handover.scenarios.study.folder.study_folder import StudyFolder
 from handover.scenarios.study.plan.order import rounds_of
 from handover.scenarios.study.plan.plan import default_plan, parse_plan
 
@@ -26,8 +28,11 @@ def test_no_code_is_run_because_a_plan_names_it(command: str, tmp_path: Path, mo
     (tmp_path / "foreign_scene.py").write_text(f"open({str(marker)!r}, 'w')\n", encoding="utf-8")
     monkeypatch.syspath_prepend(str(tmp_path))
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "plan.toml").write_text(default_plan().replace("flyer_robot_to_human", "foreign_scene:Scene"), "utf-8")
-    refused = study(*command.format(tmp_path).split())
+    StudyFolder.opened(tmp_path / "study", PLAN)
+    (tmp_path / "study" / "plan.toml").write_text(
+        default_plan().replace("flyer_robot_to_human", "foreign_scene:Scene"), "utf-8"
+    )
+    refused = study(*command.format(tmp_path / "study").split())
     assert refused.exit_code == 2, refused.output
     assert "no scenario 'foreign_scene:Scene'" in refused.output
     assert not marker.exists()
