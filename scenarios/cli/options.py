@@ -39,6 +39,22 @@ def check_new_file(option: str, file: Path, *, force: bool) -> None:
     check_place(file.parent)
 
 
+def page_to_write(folder: Path, file: Path | None) -> Path:
+    """Return where a report's page goes, which may replace one: the file of `--out`, or that in its folder.
+
+    Raises:
+        UsageError: there is a folder of that name, or it is not a page's, so that other files stay.
+        InvalidRunFolder: its folder takes none.
+    """
+    page = file or folder / "report.html"
+    if page.is_dir():
+        raise UsageError(f"{page} is a folder; name a file for the page")
+    if page.suffix.lower() != ".html":
+        raise UsageError(f"--out {page}: name a file for the page that ends with .html")
+    check_place(page.parent)
+    return page
+
+
 @contextmanager
 def refused_if_taken(option: str) -> Generator[None, None, None]:
     """Refuse the file of an option that came to be while it was written, as `check_new_file` does one from before.

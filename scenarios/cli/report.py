@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from handover.scenarios.campaign.folder import OF_NEITHER, CampaignFolder
-from handover.scenarios.cli.options import trust_option
+from handover.scenarios.cli.options import page_to_write, trust_option
 from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
 from handover.scenarios.execution.progress import doing, say
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder, check_no_links, check_place
@@ -36,13 +36,8 @@ def report(folder: Path, figures: bool, runs: bool, file: Path | None) -> None:
     with one_line_errors():
         if not folder.is_dir():
             raise UsageError(f"{folder} is not a folder; name that of a run or of a campaign")
-        page = file or folder / "report.html"
-        if page.is_dir():
-            raise UsageError(f"{page} is a folder; name a file for the page")
-        if page.suffix.lower() != ".html":
-            raise UsageError(f"--out {page}: name a file for the page that ends with .html")
+        page = page_to_write(folder, file)
         require_extra("reports", "the page")
-        check_place(page.parent)
         if figures:
             check_place(folder)
         campaign = CampaignFolder(folder)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from handover.cosim.exceptions import visible
+from handover.scenarios.cli.options import page_to_write
 from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
 from handover.scenarios.execution.progress import doing, say
 from handover.scenarios.results.run_folder import RunFolder, check_place
@@ -27,25 +28,21 @@ _FOLDER = click.argument("folder", metavar="DIR", type=click.Path(path_type=Path
     "file",
     metavar="FILE",
     type=click.Path(path_type=Path),
-    help="The page; a file of that name is replaced.  [default: DIR/report.html]",
+    help="The page, a name that ends with .html; a file of that name is replaced.  [default: DIR/report.html]",
 )
 def report(folder: Path, file: Path | None) -> None:
     """Write the page of the study in DIR: one HTML file that opens offline, and its results as CSV into DIR/results.
 
     A study that goes on has its page, too: what is not complete is said, and what too few took part in is not tested.
     """
-    with one_line_errors():
-        page = file or folder / "report.html"
-        if page.is_dir():
-            raise UsageError(f"{page} is a folder; name a file for the page")
+    with one_line_errors(), _opened(folder) as study:
+        page = page_to_write(folder, file)
         require_extra("reports", "the page")
-        with _opened(folder) as study:
-            check_place(folder)
-            check_place(page.parent)
-            from handover.scenarios.study.report.report_page import write_study_report
+        check_place(folder)
+        from handover.scenarios.study.report.report_page import write_study_report
 
-            with doing("writing the report"):
-                write_study_report(study, page)
+        with doing("writing the report"):
+            write_study_report(study, page)
     click.echo(f"report: {page}")
 
 
@@ -207,8 +204,9 @@ def _number(study: "StudyFolder", participant: str) -> int:
     Raises:
         UsageError: no session of theirs has begun.
     """
-    digits = participant.upper().removeprefix("P")
-    if not digits.isdecimal() or int(digits) not in study.numbers:
+    digits = participant.upper().removeprefix("P").lstrip("0")
+    number = next((n for n in study.numbers if str(n) == digits), None)
+    if number is None:
         known = ", ".join(s.session.pseudonym for s in study.sessions) or "none"
-        raise UsageError(f"no participant {participant!r}; sessions that have begun: {known}")
-    return int(digits)
+        raise UsageError(f"no participant {participant!r:.60}; sessions that have begun: {known}")
+    return number

@@ -5,7 +5,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from handover.scenarios.results.run_folder import disk_errors_reported
+from handover.scenarios.results.run_folder import disk_errors_reported, folder_within
 from handover.scenarios.study.folder.codebook import (
     NUMBER,
     PERSON,
@@ -112,7 +112,7 @@ def write_results(analysis: StudyAnalysis, folder: Path) -> None:
         RecordNotWritten: they cannot be written.
     """
     with disk_errors_reported(folder):
-        folder.mkdir(parents=True, exist_ok=True)
+        folder_within(folder)
     columns = result_columns(analysis.plan)
     kind = PILOT if analysis.plan.pilot else PERSON
     for name, rows_of in _ROWS.items():

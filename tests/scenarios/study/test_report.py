@@ -29,6 +29,8 @@ from handover.scenarios.study.folder.codebook import PILOT
 from handover.scenarios.study.folder.session_notes import VoidAttempt
 from handover.scenarios.study.folder.study_folder import StudyFolder
 from handover.scenarios.study.plan.plan import default_plan, parse_plan
+from handover.scenarios.study.report.result_tables import write_results
+from handover.scenarios.study.statistics.analysis import StudyAnalysis
 
 csv_of: Any = pd.read_csv  # type: ignore
 
@@ -203,6 +205,16 @@ def test_what_is_no_study_is_told(tmp_path: Path):
         assert refused.exit_code == 2
         assert "it is not the folder of a study" in refused.output
     assert not list(tmp_path.iterdir())
+
+
+def test_results_are_not_written_through_a_link(tmp_path: Path):
+    out, mine = tmp_path / "out", tmp_path / "mine"
+    study_folder = StudyFolder.opened(out, PLAN)
+    mine.mkdir()
+    (out / "results").symlink_to(mine)
+    write_results(StudyAnalysis(study_folder), out / "results")
+    assert not list(mine.iterdir())
+    assert (out / "results" / "failures.csv").is_file()
 
 
 def test_a_round_is_shown_with_its_page(tmp_path: Path):
