@@ -6,6 +6,7 @@ import socket
 from collections.abc import Callable
 from pathlib import Path
 
+import uvicorn
 from websockets.exceptions import ConnectionClosed
 
 from handover.scenarios.live.webcam import WebcamFiles
@@ -73,21 +74,22 @@ async def serve_study(
     with listening, (study := StudyFolder.opened(out, plan)).held():
         seat = StudySeat(Protocol(study, devices, number), pace, {} if webcam is None else webcam.hashes())
         server = StudyServer(seat, host, webcam, photodiode=photodiode)
+        serving = uvicorn_server(server)
         seat.on_round_end = lambda planned, ended: tell(line_of_round(plan, seat.protocol.number, planned, ended))
         address = address_of(listening, server)
-        tell(f"study: {address}  (results in {out}; Ctrl-C ends it)")
-        if TRACKER in plan.devices:
-            tell(f"a hand tracker connects to {address.replace('http', 'ws', 1)}hand")
-        if pilot:
-            await _with_pilots(server, listening, address, tell)
-        else:
-            await uvicorn_server(server).serve(sockets=[listening])
+        with serving.capture_signals():  # before anybody is told that Ctrl-C ends it
+            tell(f"study: {address}  (results in {out}; Ctrl-C ends it)")
+            if TRACKER in plan.devices:
+                tell(f"a hand tracker connects to {address.replace('http', 'ws', 1)}hand")
+            if pilot:
+                await _with_pilots(serving, server, listening, address, tell)
+            else:
+                await serving.serve(sockets=[listening])
 
 
 async def _with_pilots(
-    server: StudyServer, listening: socket.socket, address: str, tell: Callable[[str], None]
+    serving: uvicorn.Server, server: StudyServer, listening: socket.socket, address: str, tell: Callable[[str], None]
 ) -> None:
-    serving = uvicorn_server(server)
     job = asyncio.create_task(serving.serve(sockets=[listening]))
     playing = asyncio.create_task(play_sessions(address, server.seat.protocol.study.plan, tell))
     try:

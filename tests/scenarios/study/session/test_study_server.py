@@ -2,6 +2,8 @@
 
 import asyncio
 import contextlib
+import os
+import signal
 import socket
 import threading
 import urllib.request
@@ -28,7 +30,7 @@ from websockets.sync.server import ServerConnection, serve
 
 from handover.scenarios.study.session import page_messages
 from handover.scenarios.study.session.pilot import PilotRefused, play_sessions
-from handover.scenarios.study.session.served_study import address_of
+from handover.scenarios.study.session.served_study import address_of, serve_study
 
 
 def test_the_page_alone_is_served_and_to_this_computer_alone(tmp_path: Path):
@@ -67,6 +69,21 @@ def test_a_server_on_all_addresses_names_one_that_others_can_open(family: socket
         address = urlsplit(address_of(unbound, server))
     assert address.hostname not in (None, "", "0.0.0.0", "::")
     assert address.path == server.path
+
+
+def test_ctrl_c_ends_it_from_the_moment_on_that_it_is_told_of(tmp_path: Path):
+    told = list[str]()
+
+    def tell(line: str) -> None:
+        told.append(line)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    served = serve_study(
+        PLAN, tmp_path / "out", host=HOST, port=0, number=None, pace=1.0, pilot=False, webcam=None, photodiode=False,
+        tell=tell,
+    )  # fmt: skip
+    asyncio.run(served)  # no KeyboardInterrupt
+    assert "Ctrl-C ends it" in told[0]
 
 
 def test_a_second_page_is_told_that_the_seat_is_taken_and_the_first_stays(tmp_path: Path):
