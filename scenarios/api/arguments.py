@@ -332,9 +332,9 @@ def master_options(
     names = tuple(dict.fromkeys(several_texts("isolate", isolate)))
     given: dict[str, Any] = {
         **({} if algorithm is None else {"algorithm": algorithm}),
-        **({"isolated": names} if names else {}),
+        **({"isolated": names} if names and set(names) != set(chosen.isolated) else {}),
     }
     for name, value in given.items():
-        if getattr(chosen, name) not in (getattr(MasterOptions(), name), value):
+        if name in chosen.given and getattr(chosen, name) != value:
             raise InvalidInput(f"{name!r} is given in options, too, and otherwise; give one of them")
     return replace(chosen, **given)

@@ -2,7 +2,9 @@
 
 import threading
 from collections.abc import Callable
+from dataclasses import fields, replace
 from fractions import Fraction
+from inspect import signature
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -16,6 +18,7 @@ from support.wording import Wording
 import handover
 from handover.controllers.ir_grasp.parameters import Strategy
 from handover.cosim.exceptions import InvalidOptions
+from handover.scenarios.api.arguments import master_options
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.parameters import InvalidParameter
@@ -202,6 +205,9 @@ CALLS: dict[str, Callable[[Any], object]] = {
     "another algorithm in the options": lambda h: h.run(
         "ir_grasp", algorithm="jacobi", options=h.MasterOptions(algorithm=h.Algorithm.NEWTON)
     ),
+    "another algorithm than the default in the options": lambda h: h.run(
+        "ir_grasp", algorithm="jacobi", options=h.MasterOptions(algorithm=h.Algorithm.GAUSS_SEIDEL)
+    ),
     "other isolated units in the options": lambda h: h.run(
         "ir_grasp", isolate="scene", options=h.MasterOptions(isolated=("reflex",))
     ),
@@ -218,6 +224,13 @@ def test_what_cannot_be_run_is_told_in_one_sentence_and_nothing_is_written(
     wording.check(raised.value)
     assert "\n" not in str(raised.value)
     assert not any(tmp_path.iterdir())
+
+
+def test_options_go_with_arguments_that_they_leave_open_or_say_alike():
+    options = handover.MasterOptions(tolerance=1e-6, isolated=("arm", "hand"))
+    chosen = master_options(options, "newton", ["hand", "arm"])
+    assert chosen == replace(options, algorithm=handover.Algorithm.NEWTON)
+    assert [*signature(handover.MasterOptions).parameters] == [f.name for f in fields(handover.MasterOptions)]
 
 
 def test_a_file_in_a_run_s_folder_is_told_to_be_one(tmp_path: Path):
