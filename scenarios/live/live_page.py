@@ -10,7 +10,7 @@ import math
 import sys
 import time
 from collections.abc import Callable, Collection, Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import pyarrow.dataset  # type: ignore # noqa: F401  imports pandas, see `_figures`
 from starlette.requests import Request
@@ -52,6 +52,9 @@ from handover.scenarios.live.viewers import Viewers
 from handover.scenarios.live.webcam import WebcamFiles
 from handover.scenarios.reporting.html import packed_json
 from handover.scenarios.results.run_facts import whole_record_of
+from handover.scenarios.results.run_folder import InvalidRunFolder
+
+T = TypeVar("T")
 
 FRAME_PERIOD, PLOT_PERIOD = 1.0 / 30.0, 1.0
 """Time between two frames, and between two states of the plots, s."""
@@ -258,7 +261,7 @@ class LivePage:
 
     async def show_past(self, past: ShownRun) -> None:
         """Show a run that is over, from its record, at the pace that its controls say; these wait at its end."""
-        scene, control = await asyncio.to_thread(past.run.recorded_scene), past.control
+        scene, control = await self._read(past.run.recorded_scene), past.control
         if scene is None:
             return
         control.paused = control.stop = False
@@ -280,6 +283,14 @@ class LivePage:
                 await self._send_plots(*self._viewers.ready)
         await self._tell_end(past)
 
+    async def _read(self, read: Callable[[], T | None]) -> T | None:
+        """Return what is read of a run's folder; None where somebody has damaged it since, of which pages are told."""
+        try:
+            return await asyncio.to_thread(read)
+        except InvalidRunFolder as e:
+            await self.tell({"refused": str(e)})
+            return None
+
     async def _tell_states(self) -> None:
         for page in self._viewers.pages:
             await self._tell_state(page)
@@ -291,7 +302,7 @@ class LivePage:
         if shown.scene is None and not shown.run.has_verdict:  # it never began: whoever began it says why
             return
         if shown.scene is not None:
-            record = whole_record_of(shown.run.folder)
+            record = await self._read(lambda: whole_record_of(shown.run.folder))
             if record is not None:  # its last rows were never in the file of the newest ones
                 shown.scene.complete(record)
             await self._send_frame()

@@ -1,5 +1,6 @@
 """A run in a browser while it goes on: it is followed, paused, stepped, ended; its record is what it would be alone."""
 
+import asyncio
 import base64
 import json
 import re
@@ -28,10 +29,14 @@ from support.opened_page import wait_until
 from support.processes import until
 from support.wording import Wording
 
+from handover.cosim.master.live_control import LiveControl
 from handover.cosim.record.reader import Record
 from handover.fmus.build import cached
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
 from handover.scenarios.ir_grasp.parameters import Parameters
+from handover.scenarios.live.live_page import LivePage
+from handover.scenarios.live.shown_run import ShownRun
+from handover.scenarios.live.watched_run import WatchedRun
 from handover.scenarios.results.pictures import read_picture_files
 
 TITLES = "[...document.querySelectorAll('#plots h3')].map(heading => heading.textContent)"
@@ -179,6 +184,20 @@ def test_the_page_shows_what_the_cameras_see_and_the_run_is_the_same(browser: Br
     assert np.mean(cv2.absdiff(np.asarray(seen), whole)) < 8.0  # the arm has moved little
     a, b = ((folder / "signals.parquet").read_bytes() for folder in (tmp_path / "live", alone))
     assert a == b
+
+
+def test_pages_are_told_of_a_record_that_is_damaged_and_the_session_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    page, messages = LivePage(), list[dict[str, str]]()
+
+    async def tell(content: dict[str, str]) -> None:
+        messages.append(content)
+
+    monkeypatch.setattr(page, "tell", tell)
+    (tmp_path / "signals.parquet").write_bytes(b"PAR1")
+    asyncio.run(page.show_past(ShownRun(WatchedRun(tmp_path), LiveControl.in_memory(1.0), tmp_path)))
+    assert "signals.parquet is damaged" in messages[0]["refused"]
 
 
 @pytest.mark.slow
