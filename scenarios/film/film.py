@@ -47,7 +47,7 @@ def frame_times(begin: float, end: float, settings: FilmSettings) -> Floats:
         raise NotFilmed(f"the record's time goes back, from {begin:g} to {end:g} s")
     steps = (end - begin) * settings.fps / settings.pace
     if not steps <= _MOST_FRAMES:
-        faster = f"{(end - begin) * settings.fps / _MOST_FRAMES:.2g}"
+        faster = f"{1.05 * (end - begin) * settings.fps / _MOST_FRAMES:.2g}"  # two digits, none of them too small
         raise NotFilmed(
             f"{steps:.3g} frames are too many, at most {_MOST_FRAMES} are possible: --pace {faster}, or faster"
         )

@@ -138,6 +138,14 @@ def test_the_frames_times_are_even_and_end_with_the_run():
             frame_times(0.0, end, FilmSettings(pace=pace))
 
 
+@pytest.mark.parametrize("end", [6990.0, 7e3, 6.67e4, 1e5, 3.33e11])
+def test_the_pace_that_is_named_for_a_film_of_too_many_frames_is_enough(end: float):
+    with pytest.raises(NotFilmed) as refused:
+        frame_times(0.0, end, FilmSettings())
+    pace = str(refused.value).partition("--pace ")[2].partition(",")[0]
+    frame_times(0.0, end, FilmSettings(pace=float(pace)))
+
+
 def test_a_large_film_is_a_page_enlarged():
     assert window_of((1280, 720)) == ((1280, 720), 1.0)
     assert window_of((1920, 1080)) == ((1280, 720), 1.5)
