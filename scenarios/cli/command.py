@@ -83,11 +83,7 @@ class DeferredCommand(click.Command):
     def load(self) -> click.Command:
         """Return the command itself."""
         module, _, attribute = self.path.partition(":")
-        try:
-            command: click.Command = getattr(import_module(module), attribute)
-        except KeyboardInterrupt:  # click would end with the status of a task that failed
-            abort()
-        return command
+        return getattr(import_module(module), attribute)
 
 
 class _VisibleLog(logging.Formatter):
@@ -106,11 +102,13 @@ class DeferringGroup(click.Group):
     """
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Call the command; a missing package is named in one line, and errors are made visible."""
+        """Call the command, which Ctrl-C aborts; a missing package is named in a line, and errors are made visible."""
         if logging.lastResort is not None:
             logging.lastResort.setFormatter(_VisibleLog())
         try:
             return super().invoke(ctx)
+        except KeyboardInterrupt:  # click would end with the status of a task that failed
+            abort()
         except click.ClickException as e:  # such messages may quote files of others
             from handover.cosim.exceptions import visible  # loaded for this alone
 

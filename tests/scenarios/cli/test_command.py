@@ -5,6 +5,7 @@ import sys
 import zipfile
 from pathlib import Path
 
+import click
 import pytest
 from click.testing import CliRunner
 from support.commands import call, refusal
@@ -13,7 +14,7 @@ from support.wording import Wording
 
 from handover.fmus.catalog import UNITS
 from handover.scenarios.catalog import SCENARIOS
-from handover.scenarios.cli.command import main
+from handover.scenarios.cli.command import DeferringGroup, main
 from handover.scenarios.cli.console import open_console, print_rows
 from handover.scenarios.execution.progress import say
 
@@ -49,6 +50,14 @@ def test_ctrl_c_while_the_command_loads_aborts_it(tmp_path: Path):
     environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
     done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
     assert (done.returncode, done.stderr) == (130, "Aborted!\n")
+
+
+def test_ctrl_c_in_a_command_that_does_not_handle_it_aborts_it():
+    def work() -> None:
+        raise KeyboardInterrupt
+
+    group = DeferringGroup("main", commands=[click.Command("work", callback=work)])
+    assert CliRunner().invoke(group, ["work"]).exit_code == 130
 
 
 def test_settings_of_the_environment_that_cannot_be_used_are_refused(
