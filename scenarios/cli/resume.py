@@ -8,6 +8,7 @@ from pathlib import Path
 
 import click
 
+from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.cli.master_options import isolate_option, isolated
 from handover.scenarios.cli.options import limit_options, limits, log_option
 from handover.scenarios.cli.summaries.run import RunEnding
@@ -49,6 +50,8 @@ def resume(
     ):
         if not folder.is_dir():
             raise UsageError(f"{folder} is not a folder; name that of a run")
+        if CampaignFolder(folder).is_there:
+            raise UsageError(f"{folder} is the folder of a campaign; its command, run again, resumes it")
         run_folder = RunFolder.of_run(folder)
         run_folder.read_run()  # a folder that is not a run's is refused before what is missing here
         if not no_report:
