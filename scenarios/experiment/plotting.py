@@ -126,6 +126,7 @@ def _draw_time_figure(spec: TimeFigure, time: Floats, path: Path, *, as_printed:
         k for k, p in enumerate(plots) if p.has_legend and (k in bottom or _entries(p) != _entries(plots[k + 1]))
     ]
     legends = sum(_legend_rows(plots[k], width) for k in with_legend if k < rows) * 0.18
+    is_shared = columns > 1 and len(with_legend) > 1 and len({_entries(plots[k]) for k in with_legend}) == 1
     height = (_ALONE if rows == 1 else _STACKED * rows) + above + legends + 0.4
     size = (COLUMN if as_printed else _WIDTH, scale * height)
     with figure(path, rows, columns, size, as_printed=as_printed) as grid:
@@ -140,10 +141,14 @@ def _draw_time_figure(spec: TimeFigure, time: Floats, path: Path, *, as_printed:
             if k in bottom:
                 axes.set_xlabel("time (s)")
             axes.tick_params(labelbottom=k in bottom)
-            if k in with_legend:
+            if k in with_legend and not is_shared:
                 _legend_below(axes, plot, width, scale * (34.0 if k in bottom else 6.0))
         for axes in grid:
             axes.set_visible(axes.has_data())
+        if is_shared:
+            column, row = divmod(with_legend[0], rows)
+            wide = _legend_columns(plots[with_legend[0]], columns * width)
+            legend_below(grid[row * columns + column], columns=wide)
         _canvas(grid[0]).align_ylabels()
 
 
@@ -209,7 +214,7 @@ def _named(phases: Sequence[Phase], per_point: float) -> tuple[list[Phase], list
 
     The page's script names phases by the same rule (`phases.js`).
     """
-    named = [p for p in phases if p.name]
+    named = [p for p in phases if p.name and p.end > p.begin]
     level = [p for p in named if _LETTER * len(p.name) * per_point < p.end - p.begin]
     written = {p.name for p in level}
     longest: dict[str, Phase] = {}

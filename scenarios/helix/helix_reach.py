@@ -145,7 +145,7 @@ class HelixReach(Experiment[ReachEvaluator]):
             title="Gripper to the place",
             quantity="distance",
             unit="mm",
-            curves=[Curve(label="true", values=np.asarray(apart, dtype=np.float64))],
+            curves=[Curve(label="distance", values=np.asarray(apart, dtype=np.float64))],
             phases=phases,
         )
         caption = "Distance of the gripper from the place over time, by ground truth."

@@ -76,13 +76,16 @@ class HelixPlaces(PublishedExperiment):
         """Draw success by place, and the distances."""
         rows = [row for row in table.rows if is_done(row)]
         over = [
-            Mark(values_of(of, "radius"), values_of(of, "height"), form, COLOURS[k], label, style={"alpha": 0.8})
-            for k, (taken, form, label) in enumerate(((True, "o", "taken"), (False, "x", "not taken")))
+            Mark(
+                1e3 * values_of(of, "radius"), 1e3 * values_of(of, "height"), form, colour, label, style={"alpha": 0.8}
+            )
+            for taken, form, colour, label in ((True, "o", COLOURS[0], "taken"), (False, "x", COLOURS[1], "not taken"))
             for of in [[row for row in rows if row["success"] is taken]]
         ]
         known: list[float] = paper_values("helix", "reach")["height"]
         heights = np.linspace(min(known), max(h for h in known if reach(h) > 0.0), 50)
-        over.append(Mark([reach(h) for h in heights], heights, "-", "0.5", "reach", style={"lw": 1.0}))
+        reached = [1e3 * reach(h) for h in heights]
+        over.append(Mark(reached, 1e3 * heights, "-", "0.5", "reach", style={"lw": 1.0}))
         near: list[Mark] = []
         for k, (metric, label) in enumerate(
             {"closing_distance": "as it begins to close", "final_distance": "at the end"}.items()
@@ -90,7 +93,7 @@ class HelixPlaces(PublishedExperiment):
             d = 1e3 * np.sort(distances(rows, success=True, metric=metric))
             part = np.arange(1, len(d) + 1) / max(1, len(d))
             near.append(Mark(d, part, "-", COLOURS[2 + k], label, style={"drawstyle": "steps-post"}))
-        place = {"xlabel": "distance from the arm's axis (m)", "ylabel": "height in W (m)", "xlim": (0.0, None)}
+        place = {"xlabel": "distance from the arm's axis (mm)", "ylabel": "height in W (mm)", "xlim": (0.0, None)}
         of = {"xlabel": "gripper to ball (mm)", "ylabel": "part of the handovers that succeeded"}
         caption = (
             "Left: where the ball was offered, in any direction around the arm, and whether the Helix took it. Right: "

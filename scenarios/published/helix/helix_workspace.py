@@ -90,7 +90,9 @@ class HelixWorkspace(PublishedExperiment):
                 points = [p for p in tried if p is not None]
                 x, z = [p[0] for p in points], [p[1] for p in points]
                 marks.append(Mark(x, z, form, COLOURS[k], "reached" if reached else "not reached"))
-            marks += [Mark(form="s", colour=c, label=n) for c, n in zip(_SHADES, _SEEN, strict=True)]
+            marks += [
+                Mark(form="s", colour=c, label=n, style={"ms": 10.0}) for c, n in zip(_SHADES, _SEEN, strict=True)
+            ]
             axes = {"title": title, "xlabel": f"{name} (m)", "ylabel": "z (m)", "aspect": "equal"}
             panels.append(Panel(marks, axes))
         caption = (

@@ -5,17 +5,20 @@ import re
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from matplotlib.figure import Figure as Canvas
 from matplotlib.text import Annotation
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
-from handover.scenarios.experiment.plotting import figure, name_phases
-from handover.scenarios.experiment.time_plot import COLOURS, Curve, Level, Phase, TimePlot, phases_of
+from handover.scenarios.experiment import plotting
+from handover.scenarios.experiment.plotting import draw_time_figures, figure, name_phases
+from handover.scenarios.experiment.time_plot import COLOURS, Curve, Level, Phase, TimeFigure, TimePlot, phases_of
 from handover.scenarios.reporting.time_plots import time_figure, time_plots_section
 
 
@@ -100,6 +103,24 @@ def test_short_phases_are_named_upright_where_their_name_fits_over_no_other_as_f
         edges = np.linspace(0.0, 60.0, 202).tolist()
         name_phases(axes, phases_at(edges, [f"phase {k}" for k in range(201)]), 60.0 / 480.0)
         assert 10 < len(axes.texts) - before < 201
+
+
+def test_a_phase_without_length_as_at_the_end_of_a_run_takes_no_room(tmp_path: Path):
+    with figure(tmp_path / "phases", 1) as (axes,):
+        name_phases(axes, phases_at([0.0, 60.0, 60.0], ["descend", "grasp"]), 60.0 / 500.0)
+        assert [text.get_text() for text in axes.texts] == ["descend"]
+
+
+@pytest.mark.parametrize(("right", "legends"), [(("actual", "calculated"), 1), (("x", "y"), 2)])
+def test_columns_of_plots_with_the_same_curves_share_a_legend(
+    right: tuple[str, ...], legends: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    saved = Mock()
+    monkeypatch.setattr(plotting, "_save", saved)
+    plots = [plot("x", "actual", "calculated"), plot("y", "actual", "calculated"), plot("z", *right), plot("w", *right)]
+    draw_time_figures([TimeFigure(name="f", caption="", plots=plots, columns=2)], np.arange(3.0), tmp_path)
+    canvas: Canvas = saved.call_args.args[0]
+    assert len([*canvas.legends, *(a for a in canvas.axes if a.get_legend() is not None)]) == legends
 
 
 def test_a_signal_of_which_nothing_is_known_has_no_phases(tmp_path: Path):
