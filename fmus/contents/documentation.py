@@ -96,7 +96,7 @@ def page(model: Model, packages: list[Package], platform: str = "") -> bytes:
 def seconds(time: Fraction) -> str:
     """Return a time as a decimal number if that is exact, as in `0.016 s`, else as a fraction, as in `1/30 s`."""
     decimal = repr(float(time))
-    return f"{decimal if Fraction(decimal) == time else time} s"
+    return f"{decimal.removesuffix('.0') if Fraction(decimal) == time else time} s"
 
 
 def _prose(text: str) -> Markup:

@@ -162,6 +162,6 @@ class Campaign:
 
 
 def _row(point: CampaignPoint, varied: Sequence[str], metrics: Sequence[str]) -> list[str]:
-    interval = "" if point.interval is None else "{:.0%} to {:.0%}".format(*point.interval)
+    interval = "" if point.interval is None else "{:.0f} to {:.0f} %".format(*(100 * end for end in point.interval))
     medians = [str(point.medians[name]) if name in point.medians else "–" for name in metrics]
     return [*(point.values.get(name, "") for name in varied), f"{point.successes} of {point.runs}", interval, *medians]

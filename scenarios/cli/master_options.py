@@ -71,7 +71,7 @@ _OPTIONS = (
     click.option(
         "--unit-tolerance",
         multiple=True,
-        metavar="[UNIT=]NUMBER",
+        metavar="NUMBER|UNIT=NUMBER",
         help="Relative tolerance that a unit, or all others, is given for its own solver, if it has one; may be given"
         " more than once.  [default: what each FMU proposes]",
     ),

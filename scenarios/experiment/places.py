@@ -55,10 +55,16 @@ def ports_of_place(place: Place, unit: Entry) -> list[PlacePort]:
     """
     declared = {v.name: v for v in describe(import_class(unit.block)).variables}
     return [
-        PlacePort(declared[name], is_required, "; ".join(text for text in (declared[name].description, more) if text))
+        PlacePort(declared[name], is_required, _sentence(declared[name].description, more))
         for is_required, named in ((True, place.required), (False, place.optional))
         for name, more in named.items()
     ]
+
+
+def _sentence(description: str, more: str) -> str:
+    """Return a description, and those clauses on the place that it does not have itself."""
+    known = f"{description}, in W" if "in the world" in description else description
+    return "; ".join(text for text in (description, *(c for c in more.split("; ") if c not in known)) if text)
 
 
 def fit_places(system: System, places: Mapping[str, Place], units: Mapping[str, str]) -> None:

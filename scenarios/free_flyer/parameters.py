@@ -341,7 +341,7 @@ class ImpedanceParameters(RobotAndModel):
         "propulsion",
         start=Propulsion.IDEAL,
         description="what the thrusters are like; the published plots need ideal ones",
-        origin=derived("derived from the plots of sec. 4.1.3: with Astrobee's limits the robot tumbles at 3 N m"),
+        origin=derived("from the plots of sec. 4.1.3: with Astrobee's limits the robot tumbles at 3 N m"),
     )
     delay: float = expose(HandoverParameters, "delay")
     navigation_delay: float = expose(

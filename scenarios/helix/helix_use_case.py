@@ -46,44 +46,42 @@ class BowlPlace:
         "direction of the bowl from the arm's axis, as of the ball",
         minimum=-math.pi,
         maximum=math.pi,
-        origin=assumed(
-            "of the bowl's middle, about the arm's axis from +x; to the right of the cameras, where no hand was offered"
-        ),
+        origin=assumed("to the right of the cameras, where no hand was offered"),
     )
     bowl_distance: Metre = parameter(
         0.16,
         "distance of the bowl's middle from the arm's axis",
         minimum=0.0,
         maximum=1.5,
-        origin=assumed("of the bowl's middle from the arm's axis: as far as the ball is offered"),
+        origin=assumed("as far as the ball is offered"),
     )
     bowl_height: Metre = parameter(
         -0.74,
         "height of the bowl's rim in W",
         minimum=-1.1,
         maximum=0.0,
-        origin=assumed("height of the bowl's rim in W; the hanging gripper is at -0.7 m"),
+        origin=assumed("just below the hanging gripper, which is at -0.7 m"),
     )
     bowl_radius: Metre = parameter(
         0.08,
         "radius of the bowl's rim",
         minimum=0.03,
         maximum=0.5,
-        origin=assumed("of the rim; fig. 13 has a bowl of some three balls' width"),
+        origin=assumed("fig. 13 has a bowl of some three balls' width"),
     )
     drop_height: Metre = parameter(
         0.1,
         "height of the gripper over the rim as it opens",
         minimum=0.0,
         maximum=1.0,
-        origin=assumed("of the gripper over the rim as it opens"),
+        origin=assumed("own choice"),
     )
     carry_patience: Second = parameter(
         60.0,
         "time after the hand let go by which the ball must fall",
         minimum=1.0,
         maximum=600.0,
-        origin=assumed("time after the hand let go by which the ball must fall"),
+        origin=assumed("own choice"),
     )
 
     @property

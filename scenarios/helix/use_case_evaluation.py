@@ -112,8 +112,8 @@ class UseCaseEvaluator(HandoverEvaluator):
         return Outcome(success=success, reason=reason, metrics=metrics)
 
     def _success(self) -> str:
-        offset = 0.0 if self._crossed is None else _length(self._crossed)
-        return f"the ball rests in the bowl since {self._moved_at:.1f} s; it fell in {offset:.3f} m beside the middle"
+        offset = 0.0 if self._crossed is None else 1e3 * _length(self._crossed)
+        return f"the ball rests in the bowl since {self._moved_at:.1f} s; it fell in {offset:.0f} mm beside the middle"
 
     def _failure(self, handover: Outcome) -> str:
         if self._released_at is None:

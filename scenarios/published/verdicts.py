@@ -194,7 +194,7 @@ def nothing_measured(
 
 def without_verdict(claim: Claim, reason: str) -> Claim:
     """Return a claim that a rule has judged as not comparable, with a reason that stands before the rule's."""
-    text = f"{reason} For what it is worth: {claim.reason}"
+    text = f"{reason} For what it is worth: {claim.reason[:1].lower()}{claim.reason[1:]}"
     return replace(claim, verdict=Verdict.NOT_COMPARABLE, reason=text)
 
 

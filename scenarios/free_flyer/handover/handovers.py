@@ -230,7 +230,7 @@ class FailedReception(FlyerHandover):
 
 
 class HumanToRobot(FlyerHandover):
-    """The person gives, the robot takes."""
+    """The robot signals at the handover place, and closes its gripper as it feels the person push."""
 
     name: ClassVar[str] = "flyer_human_to_robot"
     title: ClassVar[str] = "a person gives an object to a free-flyer"
@@ -245,7 +245,7 @@ class HumanToRobot(FlyerHandover):
 
 
 class RobotToHuman(FlyerHandover):
-    """The robot gives, the person takes."""
+    """The robot signals at the handover place, and opens its gripper as it feels the person pull."""
 
     name: ClassVar[str] = "flyer_robot_to_human"
     title: ClassVar[str] = "a free-flyer fetches an object and gives it to a person"
@@ -268,7 +268,7 @@ _OF_TASK: Mapping[Task, type[FlyerHandover]] = {
 
 
 class HandoverOfTask(FlyerHandover):
-    """One of the four, by the parameter `task`."""
+    """The parameter `task` chooses the way; each is a scenario of its own, too."""
 
     name: ClassVar[str] = "flyer_handover"
     title: ClassVar[str] = "a free-flyer and a person hand an object over, in one of the four ways"

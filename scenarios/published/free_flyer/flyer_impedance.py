@@ -366,10 +366,11 @@ def _draw_errors(runs: PushRuns, folders: Path, folder: Path, behaviour: Behavio
         for record in records_of([] if row is None else [row["run"]], folders):
             panels += _panels(push, behaviour, _errors_of(record, behaviour))
             numbers.append(push.figure_number(behaviour).removeprefix("fig. "))
+    shown = "figs." if len(numbers) > 1 else "fig."
     caption = (
         f"Errors of the gripper's pose in W, rest minus actual, of the {behaviour.item} robot with ideal thrust, like "
-        f"figs. {' to '.join(numbers[:: max(1, len(numbers) - 1)])}: actual, calculated by eq. (4.4) (dashed), and the "
-        "linear response by python-control (dotted). Shaded: the push."
+        f"{shown} {' to '.join(numbers[:: max(1, len(numbers) - 1)])}: actual, calculated by eq. (4.4) (dashed), and "
+        "the linear response by python-control (dotted). Shaded: the push."
     )
     size = (9.0, 0.9 + 2.1 * len(numbers))
     return drawn(folder / f"errors_{behaviour.item}_{kind.name.lower()}", caption, panels, 2, size=size)

@@ -145,8 +145,8 @@ class FlyerNavigation(PublishedExperiment):
             "Successes of runs of both behaviours, with their interval (Clopper-Pearson). A run in which the robot "
             "acted with nobody at the gripper is no success. Changed hands: runs in which the object did, even if the "
             "robot then never came to rest where it retreats to. Displacement and time are medians, giving and "
-            "receiving, without the runs in which it acted alone. The last column has what decided most failures. "
-            f"Drifts have a correlation time of {_DRIFT_TIME:g} s."
+            "receiving, without the runs in which it acted alone. Where handovers failed, the last column has what "
+            f"decided most. Drifts have a correlation time of {_DRIFT_TIME:g} s."
         )
         return [table_of("Errors of the navigation", rows, note)] if rows else []
 

@@ -283,7 +283,7 @@ def _halves(arm: Arm, small: float, large: float) -> Claim:
     )
     interval = ratio_interval(x, y, np.median) if min(len(x), len(y)) >= MIN_SAMPLES else None
     if interval is None:
-        return says.unknown(f"Too few runs: {len(x)} and {len(y)} times.")
+        return says.unknown(f"Too few runs: {len(x)} and {len(y)}.")
     halves, stays = (interval[0] <= ratio <= interval[1] for ratio in (half, 1.0))
     return says.judged(
         f"{np.median(x) / np.median(y):.2f} times (medians)",

@@ -120,9 +120,10 @@ class HelixImprovements(PublishedExperiment):
         cells = [_row(x, *runs_of) for x, runs_of in _runs(table).items() if runs_of[1]]
         tried = max((len(before) for before, _ in _runs(table).values()), default=0)
         note = (
-            f"Without and with the change, at {tried} places with the same seeds. Distance is that of gripper and "
-            "ball, by ground truth, when the gripper begins to close; steps are control steps until then. Both are "
-            "medians over the places at which both did. p is that of Wilcoxon's signed-rank test of the distances."
+            f"Without and with the change, at {counted(tried, 'place')} with the same seeds. Distance is that of "
+            "gripper and ball, by ground truth, when the gripper begins to close; steps are control steps until then. "
+            "Both are medians over the places at which both did. p is that of Wilcoxon's signed-rank test of the "
+            "distances."
         )
         return [table_of("One change at a time", cells, note)]
 

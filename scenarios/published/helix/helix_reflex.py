@@ -180,7 +180,8 @@ def _centres(claim: str, of_pairs: Sequence[tuple[Row, Row]]) -> Claim:
         test.p < LEVEL and test.difference < 0.0,
         "the median of the differences is below 0 and Wilcoxon's signed-rank test, two-sided, rejects that nothing "
         f"changes: p = {format_p_value(test.p)} of {counted(len(d), 'pair')} in which the gripper closed both times",
-        f"The interval is that median's. Of {counted(len(of_pairs), 'pair')} the others say nothing here.",
+        "The interval is that median's. In "
+        f"{len(of_pairs) - len(d)} of {counted(len(of_pairs), 'pair')} it did not close both times.",
         enough=len(d) >= _MIN_PAIRS,
         interval=test.interval,
         unit="m",
@@ -201,8 +202,8 @@ def _in_spite_of_mismatches(of_pairs: Mapping[str, Sequence[tuple[Row, Row]]]) -
         all(test.p < LEVEL and test.difference < 0.0 for test in found.values()),
         f"for each of them Wilcoxon's signed-rank test, two-sided, rejects at {format_share(LEVEL)}, and the median of "
         "the differences is below 0; as all must, no correction is needed",
-        "Medians of the least clear; the table has all. Of it there are "
-        f"{counted(len(closed[worst]), 'pair')}, p = {format_p_value(found[worst].p)}.",
+        f"Medians of the least clear, of {counted(len(closed[worst]), 'pair')} (p = "
+        f"{format_p_value(found[worst].p)}); the table has all.",
         enough=min(map(len, closed.values())) >= _MIN_PAIRS,
     )
 

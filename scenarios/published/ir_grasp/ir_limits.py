@@ -119,6 +119,7 @@ class IrLimits(PublishedExperiment):
                 [
                     {"axis": axis.title, "range": _range(axis), **{arm.title: runs.half(arm, axis) for arm in ARMS}}
                     for axis in _shown(runs)
+                    if any(runs.half(arm, axis) for arm in ARMS)
                 ],
                 "Interpolated between levels. From the start: less than half is held without any disturbance, though "
                 "it may be more farther on, as where the object comes nearer.",

@@ -115,7 +115,7 @@ class Vsl2(PublishedExperiment):
     """The curve with 25 g at 1.5 bar and with 75 g at 0.5 bar, five times each, by rigid kinematics and by corrections.
 
     Corrections are those of cubic polynomials, the default, of a small network, and of a beam of four fitted numbers.
-    These ship; the paper's network is tried if `take_model` was given the file of one. Polynomials are tried with
+    These ship; the paper's network is tried if `--model` gives the file of one. Polynomials are tried with
     feedback, too, by the tracker or by an IMU a link. Besides, the arm of rigid links goes by rigid kinematics, with
     joints as stiff as assumed and stiffer. Corrections are tried on the arm that they were learned from, and on others.
     The quick plan has each case once by rigid kinematics and by polynomials, on the arm that was learned from and on

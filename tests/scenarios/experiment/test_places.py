@@ -54,6 +54,8 @@ def test_a_place_is_declared_for_each_unit_with_ports_that_its_own_unit_has(scen
         assert set(place.advised) <= set(place.optional)
         ports = ports_of_place(place, find_unit(scenario.units[name]))
         assert all(port.sentence for port in ports)
+        clauses = [port.sentence.split("; ") for port in ports]
+        assert [named for named in clauses if len(set(named)) < len(named)] == []
 
 
 def test_all_that_is_wired_is_declared_and_none_is_left_out_of_its_own_units(
