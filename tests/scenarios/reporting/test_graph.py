@@ -69,6 +69,8 @@ def test_signals_of_a_pair_share_an_arrow_that_names_them():
          connection("hand.f_G", "arm.f", unit="N", size=3)],
     )  # fmt: skip
     assert html.count('"symbol":"arrow"') == 2
+    assert ("2 units<" in html, "3 connections<" in html) == (True, True)
+    assert ("1 unit<" in html_of(["arm"], []), "0 connections<" in html_of(["arm"], [])) == (True, True)
     assert "p_WG (m, x 3)" in html
     assert "f_G \\u2192 f (N, x 3)" in html or "f_G → f (N, x 3)" in html
     assert "<td>arm.grip</td><td>hand.grip</td><td></td><td>1</td>" in html
