@@ -86,16 +86,23 @@ def set_defaults(app: Sphinx, context: object, lines: list[str]) -> None:  # noq
     lines[:] = [re.sub(r"``(?:PosixPath\()?'([^']*)'\)?``", r"``\1``", line) for line in lines]
 
 
-_NUMBER_WITH_UNIT = re.compile(r"(?<=\d) (?=(?:%|(?:mm|cm|m|ms|us|s|kg|g|N|Nm|bar|rad|deg|Hz|px|MB)\b))")
+_TOGETHER = re.compile(r"(?<=\d) (?=(?:%|(?:mm|cm|m|ms|us|s|kg|g|N|Nm|bar|rad|deg|Hz|px|MB)\b))| (?=·)|(?<=·) ")
+"""Spaces between a number and its unit, and about the dot of `hosts.md`."""
+_EXPONENT = re.compile(r"(?<=\de-)(?=\d)")
+_OPTION = re.compile(r"((?<![\w-])--[a-z][a-z-]*)")
 
 
-def keep_units(app: Sphinx, doctree: nodes.document, page: str) -> None:  # noqa: ARG001
-    """Keep numbers on one line with their units, but in code, which readers copy."""
+def keep_together(app: Sphinx, doctree: nodes.document, page: str) -> None:  # noqa: ARG001
+    """Keep numbers on one line with their units, but in code, which readers copy; show options in help as code."""
     for text in list(doctree.findall(nodes.Text)):
-        if not isinstance(text.parent, nodes.literal | nodes.literal_block | nodes.raw | nodes.math | nodes.math_block):
-            kept = _NUMBER_WITH_UNIT.sub("\N{NO-BREAK SPACE}", text)
-            if kept != text:
-                text.parent.replace(text, nodes.Text(kept))
+        if isinstance(text.parent, nodes.literal | nodes.literal_block | nodes.raw | nodes.math | nodes.math_block):
+            continue
+        kept = _EXPONENT.sub("\N{WORD JOINER}", _TOGETHER.sub("\N{NO-BREAK SPACE}", text))
+        if page == "reference/commands" and isinstance(text.parent, nodes.paragraph) and _OPTION.search(kept):
+            parts = [nodes.literal("", p) if p.startswith("--") else nodes.Text(p) for p in _OPTION.split(kept) if p]
+            text.parent.replace(text, parts)
+        elif kept != text:
+            text.parent.replace(text, nodes.Text(kept))
 
 
 def check_links(app: Sphinx, failure: Exception | None) -> None:
@@ -130,7 +137,7 @@ def setup(app: Sphinx) -> None:
     app.add_html_math_renderer("mathml", (show_inline, None), (show_block, None))
     app.connect("build-finished", check_links)
     app.connect("build-finished", check_sentences)
-    app.connect("doctree-resolved", keep_units)
+    app.connect("doctree-resolved", keep_together)
     app.connect("sphinx-click-process-description", set_columns)
     app.connect("sphinx-click-process-options", set_defaults)
     app.connect("autodoc-process-docstring", set_code)

@@ -172,7 +172,8 @@ def gallery_run(name: str, files: Path) -> GalleryRun:
     run = kept_run("run", name)
     figures = _drawn(lambda folder: _figures_of_run(RunFolder.of_run(run), folder), files, f"gallery/{name}")
     page = f"gallery/{name}/report.html"
-    shutil.copyfile(run / "report.html", files / page)
+    for file in (f for f in run.iterdir() if f.is_file()):  # the page links them
+        shutil.copyfile(file, files / f"gallery/{name}/{file.name}")
     summary = json.loads((run / "summary.json").read_text(encoding="utf-8"))
     headline = json.loads((run / "run.json").read_text(encoding="utf-8"))["headline"]
     metrics = {n: MetricRow(n, unit_symbol(m["unit"]), m["description"], format_metric(m))

@@ -9,7 +9,8 @@ import re
 
 MOST_WORDS = 32
 
-_TEXT = re.compile(r"<(p|figcaption)\b[^>]*>(.*?)</\1>", re.DOTALL)
+_TEXT = re.compile(r"<(p|figcaption|li|td|dd)\b[^>]*>((?:(?!<(?:p|figcaption|li|td|dd)\b).)*?)</\1>", re.DOTALL)
+"""What holds text, and nothing else that does."""
 _NO_WORDS = re.compile(r"<(code|math|svg)\b.*?</\1>", re.DOTALL)
 _TAG = re.compile(r"<[^>]+>")
 _NUMBERED = re.compile(r"\b\d+ [a-z ]+(?:, \d+ [a-z ]+)+")

@@ -144,6 +144,14 @@ def test_the_reference_shows_the_options_of_each_command():
         assert options <= printed
 
 
+def test_the_reference_shows_what_an_option_takes_whole():
+    """It leaves out brackets at the ends of an option's metavar, so that one at its beginning has lost the other."""
+    options = [o for _, command in maker("undocumented").commands() for o in command.params if o.name != "help"]
+    shown = [o.metavar for o in options if isinstance(o, click.Option) and o.metavar]
+    assert "NAME=VALUE" in shown
+    assert [m for m in shown if m.startswith(("[", "<", "{"))] == []
+
+
 def test_each_equation_is_mathml_that_browsers_lay_out():
     """No sign of LaTeX is left as text, and a line that ends begins another row of a table."""
     converter = importlib.import_module("latex2mathml.converter")
@@ -160,7 +168,9 @@ def test_a_sentence_that_is_too_long_is_found_where_code_equations_and_numbered_
     codes = 60 * "<code class='x'><span>f_G</span></code>, " + "<math><mi>x</mi></math>"
     short = f"<p>{codes} {words}. Another {words}. Why: {', '.join(f'{i} reason of some kind' for i in range(20))}.</p>"
     assert sentences.long_sentences(f"<p>{words} {words}</p><article>{short}</article>") == []
-    assert len(sentences.long_sentences(f"<article>{short}<figcaption>It is a {words}</figcaption></article>")) == 1
+    for tag in ("figcaption", "td", "li", "dd"):
+        assert len(sentences.long_sentences(f"<article>{short}<{tag}>It is a {words}</{tag}></article>")) == 1
+    assert len(sentences.long_sentences(f"<article><li><p>It is a {words}</p></li></article>")) == 1
 
 
 def test_a_sentence_says_how_many_runs_there_are():
