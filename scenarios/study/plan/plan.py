@@ -112,6 +112,8 @@ class StudyText(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     thanks: Text
 
 
+_COLUMNS = ("participant", "kind")
+"""Of questionnaire.csv, besides the questions'."""
 _Value = str | int | float | bool
 _Parameters = dict[str, _Value | list[_Value]]
 _Rating = Annotated[int, Meta(ge=0, le=100)]
@@ -285,7 +287,11 @@ def _faults(plan: _Plan) -> Iterator[str]:
     for kind, names in (("statements", plan.statements), ("questions", questions)):
         if len(set(names)) < len(names):
             yield f"{kind}: a name is given twice"
+    if taken := [name for name in questions if name in _COLUMNS]:
+        yield f"questions: {taken[0]} is another column of questionnaire.csv; choose another name"
     for k, question in enumerate(plan.questions, 1):
+        if len(set(question.choices)) < len(question.choices):
+            yield f"questions[{k}].choices: a choice is given twice"
         if (question.kind == "choice") is not bool(question.choices):
             yield f"questions[{k}].choices: {len(question.choices)} given; kind 'choice' has some, 'text' none"
     if not plan.text:

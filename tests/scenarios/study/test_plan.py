@@ -94,6 +94,8 @@ def test_all_faults_are_told_at_once(wording: Wording):
         ("[tasks.human_to_robot]", '[tasks."a b"]'),
         ("[tasks.human_to_robot]", "[tasks.human_to_robot]\nrigd = {}"),
         ('"not_said"]\n\n[[', '"not_said", "mars"]\n\n[['),
+        ('"18-20", "21-30"', '"18-20", "18-20"'),
+        ("age_group", "participant"),
         ("participants = 18", "participants = nan"),
         ("practice = 600", "practice = inf"),
         ('behaviour = "compliant"', 'bahaviour = "compliant"'),
