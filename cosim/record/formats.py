@@ -32,7 +32,7 @@ def write_parquet(path: Path, schema: "pa.Schema", batches: Iterable["pa.RecordB
     # Reals hardly repeat: a dictionary of them takes three times as long and makes the file larger.
     types: list[tuple[str, Any]] = list(zip(schema.names, schema.types, strict=True))
     repeating: Any = [name for name, kind in types if not pa.types.is_floating(kind)] or False
-    with pq.ParquetWriter(path, schema, use_dictionary=repeating) as file:
+    with pq.ParquetWriter(path, schema, use_dictionary=repeating, write_page_checksum=True) as file:
         for group in _row_groups(schema, batches):
             file.write_table(group, row_group_size=group.num_rows)
 

@@ -47,7 +47,7 @@ def read_parquet(path: Path) -> Any:
     check_regular(path)
     most = max(_FREE, _RATIO * path.stat().st_size)
     try:
-        with pq.ParquetFile(path) as file:
+        with pq.ParquetFile(path, page_checksum_verification=True) as file:
             schema: Any = file.schema_arrow
             if len(set(schema.names)) < len(schema.names):
                 raise InvalidRecord(path, "two of its columns have one name")

@@ -219,7 +219,7 @@ def rewind_stream(path: Path, schema: "pa.Schema", rows: int) -> int:
     present = stream_schema(stream) if source == stream else pq.read_schema(path)
     if not present.equals(schema, check_metadata=True):
         raise OSError(f"{source} has other columns than this run records")
-    batches = stream_batches(stream) if source == stream else pq.ParquetFile(path).iter_batches()
+    batches = stream_batches(stream) if source == stream else _completed_batches(path)
     unfinished = stream.with_name(stream.name + ".part")
     unfinished.unlink(missing_ok=True)  # it may be a link to another file
     rewound = RecordStream(unfinished, schema)
@@ -248,6 +248,10 @@ def _unfinished_block(path: Path) -> RecordBlock | None:
 def _chained(stream: Path, last: "pa.RecordBatch") -> Iterable["pa.RecordBatch"]:
     yield from stream_batches(stream)
     yield last
+
+
+def _completed_batches(path: Path) -> Iterable["pa.RecordBatch"]:
+    return pq.ParquetFile(path, page_checksum_verification=True).iter_batches()
 
 
 def _rows_in(path: Path) -> int:

@@ -71,6 +71,19 @@ def test_what_is_no_record_is_refused_where_it_is_opened(tmp_path: Path, wording
         wording.check(caught.value)
 
 
+def test_a_record_of_which_some_bytes_are_others_is_refused(tmp_path: Path):
+    file = tmp_path / "r.parquet"
+    with Recorder(file) as recorder:
+        for k in range(500):
+            recorder(float(k), signals_of({"x": np.sin([k, k + 0.5])}))
+    content = bytearray(file.read_bytes())
+    middle = len(content) // 3
+    content[middle : middle + 8] = np.float64(1e300).tobytes()
+    file.write_bytes(content)
+    with pytest.raises((InvalidRecord, OSError)):
+        Record(file)
+
+
 @pytest.mark.parametrize("metadata", [{"unit": b"\xff"}, {"items": b"x WAIT"}])
 def test_damaged_metadata_of_a_column_are_refused(tmp_path: Path, metadata: dict[str, bytes]):
     schema = pa.schema([pa.field("time", pa.float64()), pa.field("a.phase", pa.int64(), metadata=cast(Any, metadata))])
