@@ -224,6 +224,14 @@ class SourceData(TypedDict, total=False):
     input_sha256: str
 
 
+class ExperimentData(TypedDict, total=False):
+    """What units got as they were initialised: times, s, and the tolerances of their solvers."""
+
+    start: float
+    stop: float | None
+    tolerances: dict[str, float]
+
+
 class _OfSomeRuns(TypedDict, total=False):
     system: SystemData
     conversions: list[ConversionData]
@@ -241,7 +249,7 @@ class _OfSomeRuns(TypedDict, total=False):
     told_parameters: list[tuple[str, str, str]]
     units: dict[str, FmuData]
     versions: dict[str, str]
-    experiment: dict[str, Any]
+    experiment: ExperimentData
 
 
 class RunData(Configuration, _OfSomeRuns):

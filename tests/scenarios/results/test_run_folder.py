@@ -133,6 +133,7 @@ def test_a_package_that_is_not_installed_is_reported(monkeypatch: pytest.MonkeyP
         ("run.json", {"files": {"arm": "\0"}}),
         ("run.json", {"told_parameters": [["a", "b"]]}),
         ("run.json", {"system": {"connections": [{"source": "a", "target": "b.c"}]}}),
+        ("run.json", {"experiment": {"stop": "soon"}}),
         ("summary.json", {"success": "yes"}),
         ("summary.json", {"metrics": {"error": {"value": "1", "unit": "m"}}}),
         ("summary.json", {"simulated_seconds": "long"}),
