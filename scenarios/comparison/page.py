@@ -37,7 +37,7 @@ from handover.scenarios.experiment.time_plot import TimeFigure
 from handover.scenarios.reporting.page import Section, write_page
 from handover.scenarios.reporting.time_plots import time_plots_section
 from handover.scenarios.results.run_folder import RunFolder, disk_errors_reported, write_whole
-from handover.scenarios.results.tolerated_faults import ToleratedFaults
+from handover.scenarios.results.tolerated_faults import ToleratedFaults, drawing
 
 
 @dataclass(frozen=True)
@@ -144,6 +144,7 @@ class RunComparison:
 Comparison = CampaignComparison | RunComparison
 
 
+@drawing
 def compare(
     folders: Sequence[Path], names: Sequence[str] = (), signals: Sequence[str] = (), metrics: Sequence[str] = ()
 ) -> Comparison:
@@ -174,6 +175,7 @@ def compare(
     return RunComparison(runs, differences_of(runs), metric_rows(runs), overlaid(runs, signals))
 
 
+@drawing
 def write_comparison(comparison: Comparison, folder: RunFolder) -> dict[str, Any]:
     """Write page, table, data and figures into a new folder, and return what `comparison.json` holds.
 

@@ -21,7 +21,7 @@ from handover.scenarios.reporting.run_page import replay_and_plots
 from handover.scenarios.reporting.time_plots import time_figure
 from handover.scenarios.results.run_facts import RunFacts, elements_of, record_of
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
-from handover.scenarios.results.tolerated_faults import ToleratedFaults
+from handover.scenarios.results.tolerated_faults import ToleratedFaults, drawing
 
 VIEWS = ("start", "front", "side", "top", "follow")
 MAX_FRAMES = 3000
@@ -68,6 +68,7 @@ class FilmContent:
         return float(self.record.time[0]), float(self.record.time[-1])
 
 
+@drawing
 def film_content(folder: RunFolder, names: Sequence[str] | None, height: int) -> FilmContent:
     """Return what a film of a run shows: its scene, and plots.
 

@@ -20,7 +20,7 @@ from handover.scenarios.results.lacking_record import LackingRecord
 from handover.scenarios.results.pictures import read_picture_files
 from handover.scenarios.results.run_facts import RunFacts, record_of
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder, disk_errors_reported, folder_within
-from handover.scenarios.results.tolerated_faults import ToleratedFaults
+from handover.scenarios.results.tolerated_faults import ToleratedFaults, drawing
 
 _MAX_SIGNALS = 6
 """Ports of a unit in its figure."""
@@ -48,6 +48,7 @@ def draw_figures(
     return drawn
 
 
+@drawing
 def draw_run(folder: RunFolder) -> list[str]:
     """Draw a run's figures into `figures/`, replacing those of the same names; return what failed, a line each.
 

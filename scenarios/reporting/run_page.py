@@ -28,9 +28,10 @@ from handover.scenarios.results.lacking_record import LackingRecord
 from handover.scenarios.results.run_facts import RunFacts, record_of
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
 from handover.scenarios.results.tables import format_conversion, format_metric, master_rows, warning_lines
-from handover.scenarios.results.tolerated_faults import ToleratedFaults
+from handover.scenarios.results.tolerated_faults import ToleratedFaults, drawing
 
 
+@drawing
 def write_run_page(folder: RunFolder, file: Path | None = None) -> list[str]:
     """Write the page of a run, with all that its folder has of it; return what could not be shown, a line each.
 

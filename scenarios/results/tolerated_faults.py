@@ -12,6 +12,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Generic
 
+import numpy as np
+
 from handover.cosim.blocks.state import NotPlainData
 from handover.cosim.exceptions import CosimError, one_line
 from handover.cosim.system.signals import Signals
@@ -20,6 +22,9 @@ from handover.scenarios.experiment.experiment import AnyEvaluator, Evaluator, Ex
 from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.experiment.pictures import CameraPicture
 from handover.scenarios.experiment.returned_types import WrongType
+
+drawing = np.errstate(all="ignore")
+"""Decorates what draws outputs: those beyond the numbers of a page are gaps in it, without numpy's warnings."""
 
 _MAX_MESSAGE = 200  # characters
 
