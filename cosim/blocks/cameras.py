@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from handover.cosim.blocks.geometry import looking_at, quaternion_of
-from handover.cosim.blocks.origins import assumed, stated
-from handover.cosim.blocks.ports import Vector3, Vector4, Vector5, parameter
+from handover.cosim.blocks.origins import Origin, assumed, stated
+from handover.cosim.blocks.ports import Floats, Vector3, Vector4, Vector5, parameter
 from handover.cosim.blocks.units import Metre, Number, Pixel
 
 _AIMED = assumed("point in W that all cameras look at")
@@ -22,83 +22,55 @@ _BEHIND = assumed(
     "left and right camera; sec. 3.2.1 and 5.4.1 say behind the arm, at about the gripper's "
     "height, 0.5 m (of what, is open)"
 )
+_ABOVE = assumed(
+    "sec. 5.4.1: one of the cameras looking down from the top, also beside the other two as a third. Where is "
+    "open: 50 degrees down on what all look at"
+)
 
 _P_WC_LEFT = np.array([-0.95, 0.25, -0.60])
 _P_WC_RIGHT = np.array([-0.95, -0.25, -0.60])
 _P_WC_THIRD = np.array([-0.55, 0.0, 0.1])
-_LOOKED_AT = np.array([0.0, 0.0, -0.62])
+LOOKED_AT = np.array([0.0, 0.0, -0.62])
+"""Point in W that all cameras look at, m."""
+
+
+def _position(camera: str, p_WC: Floats, origin: Origin) -> Floats:
+    return parameter(p_WC, f"position of the {camera} camera in the world", origin=origin)
+
+
+def _orientation(camera: str, p_WC: Floats) -> Floats:
+    q_WC = quaternion_of(looking_at(p_WC, LOOKED_AT))
+    return parameter(q_WC, f"orientation of the {camera} camera in the world", origin=_AIMED)
+
+
+def _intrinsics(camera: str, *values: float) -> Floats:
+    text = f"{camera} camera's focal lengths and principal point: fx, fy, cx, cy"
+    return parameter(np.array(values), text, origin=_INTRINSICS)
+
+
+def _distortion(camera: str, *values: float) -> Floats:
+    return parameter(np.array(values), f"{camera} lens's distortion: k1, k2, p1, p2, k3", origin=_DISTORTION)
 
 
 @dataclass(frozen=True, kw_only=True)
 class CamerasAndMarkers:
     """Calibration of two cameras or three, and sizes of what they see."""
 
-    p_WC_left: Vector3[Metre] = parameter(
-        _P_WC_LEFT,
-        "position of the left camera in the world",
-        origin=_BEHIND,
-    )
-    p_WC_right: Vector3[Metre] = parameter(
-        _P_WC_RIGHT,
-        "position of the right camera in the world",
-        origin=_BEHIND,
-    )
-    q_WC_left: Vector4[Number] = parameter(
-        quaternion_of(looking_at(_P_WC_LEFT, _LOOKED_AT)),
-        "orientation of the left camera in the world",
-        origin=_AIMED,
-    )
-    q_WC_right: Vector4[Number] = parameter(
-        quaternion_of(looking_at(_P_WC_RIGHT, _LOOKED_AT)),
-        "orientation of the right camera in the world",
-        origin=_AIMED,
-    )
-    intrinsics_left: Vector4[Pixel] = parameter(
-        np.array([907.0, 906.0, 642.5, 357.0]),
-        "left camera's focal lengths and principal point: fx, fy, cx, cy",
-        origin=_INTRINSICS,
-    )
-    intrinsics_right: Vector4[Pixel] = parameter(
-        np.array([908.5, 907.5, 636.0, 361.5]),
-        "right camera's focal lengths and principal point: fx, fy, cx, cy",
-        origin=_INTRINSICS,
-    )
-    distortion_left: Vector5[Number] = parameter(
-        np.array([0.105, -0.190, 0.0006, -0.0008, 0.060]),
-        "left lens's distortion: k1, k2, p1, p2, k3",
-        origin=_DISTORTION,
-    )
-    distortion_right: Vector5[Number] = parameter(
-        np.array([0.092, -0.165, -0.0005, 0.0007, 0.045]),
-        "right lens's distortion: k1, k2, p1, p2, k3",
-        origin=_DISTORTION,
-    )
+    p_WC_left: Vector3[Metre] = _position("left", _P_WC_LEFT, _BEHIND)
+    p_WC_right: Vector3[Metre] = _position("right", _P_WC_RIGHT, _BEHIND)
+    q_WC_left: Vector4[Number] = _orientation("left", _P_WC_LEFT)
+    q_WC_right: Vector4[Number] = _orientation("right", _P_WC_RIGHT)
+    intrinsics_left: Vector4[Pixel] = _intrinsics("left", 907.0, 906.0, 642.5, 357.0)
+    intrinsics_right: Vector4[Pixel] = _intrinsics("right", 908.5, 907.5, 636.0, 361.5)
+    distortion_left: Vector5[Number] = _distortion("left", 0.105, -0.190, 0.0006, -0.0008, 0.060)
+    distortion_right: Vector5[Number] = _distortion("right", 0.092, -0.165, -0.0005, 0.0007, 0.045)
     has_third: bool = parameter(
         False, "whether there is a third camera; its picture is black without", origin=stated("sec. 3.2.1: two cameras")
     )
-    p_WC_third: Vector3[Metre] = parameter(
-        _P_WC_THIRD,
-        "position of the third camera in the world",
-        origin=assumed(
-            "sec. 5.4.1: one of the cameras looking down from the top, also beside the other two as a third. Where is "
-            "open: 50 degrees down on what all look at"
-        ),
-    )
-    q_WC_third: Vector4[Number] = parameter(
-        quaternion_of(looking_at(_P_WC_THIRD, _LOOKED_AT)),
-        "orientation of the third camera in the world",
-        origin=_AIMED,
-    )
-    intrinsics_third: Vector4[Pixel] = parameter(
-        np.array([906.0, 905.5, 639.0, 358.5]),
-        "third camera's focal lengths and principal point: fx, fy, cx, cy",
-        origin=_INTRINSICS,
-    )
-    distortion_third: Vector5[Number] = parameter(
-        np.array([0.098, -0.178, 0.0002, 0.0004, 0.052]),
-        "third lens's distortion: k1, k2, p1, p2, k3",
-        origin=_DISTORTION,
-    )
+    p_WC_third: Vector3[Metre] = _position("third", _P_WC_THIRD, _ABOVE)
+    q_WC_third: Vector4[Number] = _orientation("third", _P_WC_THIRD)
+    intrinsics_third: Vector4[Pixel] = _intrinsics("third", 906.0, 905.5, 639.0, 358.5)
+    distortion_third: Vector5[Number] = _distortion("third", 0.098, -0.178, 0.0002, 0.0004, 0.052)
     apothem: Metre = parameter(
         0.034,
         "distance of the markers from the arm's axis",

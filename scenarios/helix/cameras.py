@@ -2,7 +2,7 @@
 
 As in the thesis ([Vervloet2025] sec. 3.2.2), somebody clicks on six corners of a box in each picture, and the detector
 gets the poses that follow from these clicks alone. Lenses are calibrated separately, which is taken as perfect (an
-assumption). The values are those of `paper.toml`.
+assumption).
 """
 
 import enum
@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from handover.cosim.blocks.cameras import LOOKED_AT, CamerasAndMarkers
 from handover.cosim.blocks.geometry import Pinhole, looking_at, quaternion_of, rotation_by
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.experiment.paper import paper_values
@@ -53,20 +54,19 @@ def camera_parameters(turned: float = 0.0, places: CameraPlaces = CameraPlaces.B
         turned: angle by which the right camera was turned to its left about its upright axis, rad.
         places: of the cameras.
     """
-    camera = {name: np.array(value) for name, value in paper_values("helix", "camera").items()}
+    usual = CamerasAndMarkers()
     parameters: dict[str, Any] = {"has_third": True} if places is CameraPlaces.THREE else {}
     elsewhere = {
-        CameraPlaces.TOP: {"right": camera["p_WC_top"]},
-        CameraPlaces.SIDE: {"right": camera["p_WC_side"]},
-        CameraPlaces.THREE: {"third": camera["p_WC_top"]},
-    }.get(places, {})
-    for i, side in enumerate(places.sides):
-        p_WC = elsewhere[side] if side in elsewhere else camera["p_WC"][i]
+        (CameraPlaces.TOP, "right"): usual.p_WC_third,
+        (CameraPlaces.SIDE, "right"): np.array(paper_values("helix", "camera")["p_WC_side"]),
+    }
+    for side in places.sides:
+        p_WC = elsewhere.get((places, side), getattr(usual, f"p_WC_{side}"))
         turn = rotation_by(np.array([0.0, -turned if side == "right" else 0.0, 0.0]))
         parameters[f"p_WC_{side}"] = p_WC
-        parameters[f"q_WC_{side}"] = quaternion_of(looking_at(p_WC, camera["looked_at"]) @ turn)
-        parameters[f"intrinsics_{side}"] = camera["intrinsics"][i]
-        parameters[f"distortion_{side}"] = camera["distortion"][i]
+        parameters[f"q_WC_{side}"] = quaternion_of(looking_at(p_WC, LOOKED_AT) @ turn)
+        for lens in (f"intrinsics_{side}", f"distortion_{side}"):
+            parameters[lens] = getattr(usual, lens)
     return parameters
 
 
@@ -141,7 +141,7 @@ def marker_fault(marker: float) -> str | None:
     f = max(float(camera.f.max()) for camera in two)
     farthest = [np.array([r, 0.0, z]) for z, r in zip(reach["height"], reach["radius"], strict=True)]
     depth = max(float(camera.depth(p_WG)) for camera in two for p_WG in farthest)
-    side_of_collar = 2.0 * paper_values("helix", "camera")["apothem"] * np.tan(np.pi / 8.0)
+    side_of_collar = 2.0 * CamerasAndMarkers().apothem * np.tan(np.pi / 8.0)
     least, most = MIN_MARKER_SIDE * depth / f, side_of_collar / (1.0 + 2.0 * _MARGIN)
     would_do = f"{np.ceil(1e4 * least) / 1e4:g} to {np.floor(1e4 * most) / 1e4:g} m would do"
     if marker < least:

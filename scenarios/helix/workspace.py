@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from handover.controllers.helix.vision.markers import MarkerRing
+from handover.cosim.blocks.cameras import CamerasAndMarkers
 from handover.cosim.blocks.geometry import Pinhole
 from handover.cosim.blocks.ports import Floats
 from handover.plants.helix.arm.tendon_parameters import Params as ArmParams
@@ -38,14 +39,14 @@ def _sees(camera: Pinhole, p_WO: Floats, marker: float | None = None) -> bool:
 
 def _hidden(camera: Pinhole, p_WO: Floats, marker: float | None) -> str:
     """Return why a camera does not see ball and ring whole; "" if it does."""
-    values, d_gripper = paper_values("helix", "camera"), float(ArmParams().d_gripper)
+    usual, d_gripper = CamerasAndMarkers(), float(ArmParams().d_gripper)
     p_WR = p_WO + np.array([0.0, 0.0, d_gripper])
     depth_O, depth_R = (float(camera.depth(p)) for p in (p_WO, p_WR))
     if min(depth_O, depth_R) <= 0.0:
         return _OUTSIDE
-    side_length = values["marker"] if marker is None else marker
-    ring = p_WR + MarkerRing(values["apothem"], side_length).outline
-    edge = float(camera.f.max()) * values["ball_radius"] / depth_O
+    side_length = usual.marker if marker is None else marker
+    ring = p_WR + MarkerRing(usual.apothem, side_length).outline
+    edge = float(camera.f.max()) * usual.ball_radius / depth_O
     side = float(camera.f.min()) * side_length / depth_R
     if not (_is_inside(camera.project(p_WO)[None], edge) and _is_inside(camera.project(ring), 0.0)):
         return _OUTSIDE
