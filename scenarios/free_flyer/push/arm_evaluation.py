@@ -7,7 +7,6 @@ that is not square, by the controllers' model of the robot.
 import itertools
 import math
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
@@ -22,23 +21,16 @@ from handover.cosim.blocks.geometry import rotation_angle, rotation_of
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.cosim.system.signals import Signals
-from handover.cosim.system.system import PlacedUnit
-from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
-from handover.scenarios.experiment.paper import paper_values
-from handover.scenarios.free_flyer.model_mismatch import model_mismatch
+from handover.scenarios.experiment.experiment import Metric
 from handover.scenarios.free_flyer.push.arm_parameters import ArmPushParameters, ArmTarget
-from handover.scenarios.free_flyer.push.hand_push import HAND_SIGNALS, HandPush, hand_push_at
+from handover.scenarios.free_flyer.push.hand_push import HAND_SIGNALS, HandPush
 from handover.scenarios.free_flyer.push.impedance_evaluation import (
-    REST_ANGLE,
-    REST_POSITION,
-    RESTING,
-    SPINNING,
     Errors,
+    PushEvaluator,
     agreement_bound,
     mean_between,
     steps_of_period,
 )
-from handover.scenarios.free_flyer.robot_wiring import SATURATED_SHARE, stability_metrics
 
 SIGNALS = (
     *(f"robot.{name}" for name in ("p_WG", "q_WG", "v_WG", "w_WG", "p_WB", "q_WB", "v_WB", "w_WB", "q_J", "v_J")),
@@ -52,7 +44,7 @@ _TURNED = 1e-9
 """Radians by which a joint has turned."""
 
 
-Columns = dict[str, Floats]
+Columns = Mapping[str, Floats]
 
 
 def columns_of(record: Record) -> Columns:
@@ -123,64 +115,26 @@ def _inertial_wrench(motion: Columns, first: int, last: int, target: ArmTarget) 
     return wrench, np.transpose(space.J_bar)[:, :6]
 
 
-class ArmImpedanceEvaluator(Evaluator):
-    """Follows one push and decides whether the gripper came back to rest and moved as by the impedance model."""
+class ArmImpedanceEvaluator(PushEvaluator[ArmPushParameters]):
+    """Follows one push of a robot whose arm gives way."""
 
-    records = (Metric,)
+    signals = SIGNALS
 
     def __init__(self, parameters: ArmPushParameters) -> None:
-        self.parameters = parameters
+        super().__init__(parameters)
         target = parameters.target()
         self._p_WG, self._R_WG = target.p_WG, target.R_WG
-        self._rows: list[list[Any]] = []
-        self._saturated, self._t, self._astray, self._spins = 0, 0.0, 0.0, False
-        self._greatest = [0.0, 0.0]
-        self._stability: dict[str, Metric] = {}
-        self._mismatch = ""
 
-    def note_units(self, units: Mapping[str, PlacedUnit]) -> None:
-        """Keep what the controllers do not know of the robot."""
-        self._mismatch = model_mismatch(units)
-
-    def __call__(self, t: float, signals: Signals) -> None:
-        """Keep the motion and follow the errors."""
-        if not self._rows:
-            self._stability = stability_metrics(signals, ("impedance",))
-        self._rows.append([t, *(signals[name] for name in SIGNALS), *hand_push_at(signals)])
-        self._saturated += bool(signals["thrusters.saturated"])
+    def _away(self, signals: Signals) -> tuple[float, float]:
         away = float(np.linalg.norm(signals["robot.p_WG"] - self._p_WG))
-        turned = rotation_angle(np.transpose(self._R_WG) @ rotation_of(signals["robot.q_WG"]))
-        self._greatest = [max(self._greatest[0], away), max(self._greatest[1], turned)]
-        self._t, self._spins = t, float(np.linalg.norm(signals["robot.w_WB"])) > SPINNING
-        if away > REST_POSITION or turned > REST_ANGLE:
-            self._astray = t
+        return away, rotation_angle(np.transpose(self._R_WG) @ rotation_of(signals["robot.q_WG"]))
 
-    @property
-    def over(self) -> bool:
-        """Whether the gripper has come to rest after the push, or the robot spins out of control."""
-        return self._spins or self._at_rest
+    def _errors(self, motion: Mapping[str, Floats]) -> Errors:
+        return errors_with_arm(motion, self.parameters.target())
 
-    @property
-    def _at_rest(self) -> bool:
-        return self._t - max(self._astray, self._end) >= RESTING
-
-    @property
-    def _end(self) -> float:
-        """When the last push ended, s, be it by hand."""
-        return max(self.parameters.end, self.last_pushed)
-
-    def outcome(self) -> Outcome:
-        """Return whether the gripper rests again and agreed with the model, why, and the metrics."""
-        if len(self._rows) < 2:
-            return Outcome(success=False, reason="stopped before the first step")
-        names = ("t", *SIGNALS, *HAND_SIGNALS)
-        motion = {name: np.array(column) for name, column in zip(names, zip(*self._rows, strict=True), strict=True)}
-        by = errors_with_arm(motion, self.parameters.target()).disagreement
-        bounds = paper_values("free_flyer", "published")["model_agreement"]
-        agrees = by[0] <= bounds[0] and by[1] <= bounds[1]
-        metrics = self._metrics(motion, by)
+    def _reason(self, motion: Mapping[str, Floats], by: tuple[float, float], *, agrees: bool) -> str:
         back = (
-            f"the gripper was back at rest {max(0.0, self._astray - self._end):.1f} s after the push"
+            f"the gripper was back at rest {self._settled:.1f} s after the push"
             if self._at_rest
             else f"the gripper was not back at rest at {self._t:.1f} s"
         )
@@ -188,12 +142,7 @@ class ArmImpedanceEvaluator(Evaluator):
         joined = "and" if agrees is self._at_rest else "but"
         extent = f"{'within' if agrees else 'by'} {1000 * by[0]:.1f} mm and {math.degrees(by[1]):.2f}°"
         bound = "" if agrees else f", {agreement_bound()}"
-        reason = f"{back}, {joined} {verb} the impedance model {extent}{bound}{self._stopped_joints(motion)}"
-        return Outcome(
-            success=self._at_rest and agrees,
-            reason=reason + self._mismatch,
-            metrics=metrics,
-        )
+        return f"{back}, {joined} {verb} the impedance model {extent}{bound}{self._stopped_joints(motion)}"
 
     def _stopped_joints(self, motion: Columns) -> str:
         """Return which free joints were held away from where they began, as a clause; one that turns is never at 0."""
@@ -212,22 +161,10 @@ class ArmImpedanceEvaluator(Evaluator):
         turn = 2.0 * np.arccos(np.minimum(1.0, np.abs(motion["robot.q_WB"] @ motion["robot.q_WB"][0])))
         joints = np.abs(motion["robot.q_J"] - motion["robot.q_J"][0])
         impulse = np.diff(motion["t"]) @ np.linalg.norm(motion["thrusters.f_B"][1:], axis=1)
-        model = "[Fernandes2020] eq. (4.4) with joints"
-        metrics = {
-            "greatest_position_error": Metric(self._greatest[0], "m", "gripper from its place of rest at most"),
-            "greatest_orientation_error": Metric(self._greatest[1], "rad", "gripper from its rest orientation at most"),
+        own = {
             "base_displacement": Metric(float(base.max()), "m", "base from where it was at most"),
             "base_turn": Metric(float(turn.max()), "rad", "base from its first attitude at most"),
             "joint_motion": Metric(float(joints.max()), "rad", "a joint from its first angle at most"),
             "thrust_impulse": Metric(float(impulse), "N.s", "impulse of the thrusters, whatever its direction"),
-            "disagreement_position": Metric(by[0], "m", f"actual against calculated position error at most, {model}"),
-            "disagreement_orientation": Metric(
-                by[1], "rad", f"actual against calculated orientation error at most, {model}"
-            ),
-            "saturated_share": Metric(self._saturated / len(self._rows), "1", SATURATED_SHARE),
-            **self._stability,
         }
-        if self._at_rest:
-            settled = max(0.0, self._astray - self._end)
-            metrics["settling_time"] = Metric(settled, "s", "from the end of the push until the gripper stays at rest")
-        return metrics
+        return self._push_metrics(by, "[Fernandes2020] eq. (4.4) with joints", "at rest", own)

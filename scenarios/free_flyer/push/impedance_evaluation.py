@@ -4,11 +4,13 @@ The gripper's pose error is compared with the one by the impedance model, [Ferna
 `errors_of` computes from the actual motion.
 """
 
+import abc
 import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from types import MappingProxyType
+from typing import Any, ClassVar, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -206,20 +208,20 @@ def agreement_bound() -> str:
     return f"by its residual in eq. (4.4), of which {1000 * by[0]:.0f} mm and {math.degrees(by[1]):.1f}° at most agree"
 
 
-class ImpedanceEvaluator(Evaluator):
-    """Follows one push and decides whether the robot came back to rest and moved as by the impedance model.
+P = TypeVar("P", bound=ImpedanceParameters)
 
-    Raises:
-        KeyError: `paper.toml` lacks the place of rest.
+
+class PushEvaluator(Evaluator, Generic[P]):
+    """Follows one push and decides whether the gripper came back to rest, and moved as by a model of its impedance.
+
+    Subclasses say which `signals` make up a motion, and what an error is.
     """
 
-    records = (Metric, Body)
+    records = (Metric,)
+    signals: ClassVar[tuple[str, ...]]
 
-    def __init__(self, parameters: ImpedanceParameters) -> None:
+    def __init__(self, parameters: P) -> None:
         self.parameters = parameters
-        self.p_WG_goal = np.array(paper_values("free_flyer", "push_place")["p_WG_goal"])
-        x, y, z = self.p_WG_goal.tolist()
-        self._goal = (x, y, z)
         self._rows: list[list[Any]] = []
         self._saturated = 0
         self._t = 0.0
@@ -228,32 +230,31 @@ class ImpedanceEvaluator(Evaluator):
         self._greatest = [0.0, 0.0]
         self._last = (0.0, 0.0)
         self._stability: dict[str, Metric] = {}
-        self._mismatch, self._model = "", parameters.model
+        self._mismatch = ""
 
     def note_units(self, units: Mapping[str, PlacedUnit]) -> None:
-        """Keep what the controller takes the robot to be, and what it does not know of it."""
+        """Keep what the controllers do not know of the robot."""
         self._mismatch = model_mismatch(units)
-        if "impedance" in units:
-            self._model = assumed_body(units["impedance"], self._model)
 
     def __call__(self, t: float, signals: Signals) -> None:
         """Keep the motion and follow the errors."""
         if not self._rows:
             self._stability = stability_metrics(signals, ("impedance",))
-        seen = [signals[name] for name in MOTION_SIGNALS]
-        self._rows.append([t, *seen, *hand_push_at(signals)])
+        self._rows.append([t, *(signals[name] for name in self.signals), *hand_push_at(signals)])
         self._saturated += bool(signals["thrusters.saturated"])
-        away = math.dist(seen[0].tolist(), self._goal)
-        turned = 2.0 * math.acos(min(1.0, abs(float(seen[2][0]))))
-        self._t, self._last = t, (away, turned)
-        self._spins = math.hypot(*seen[3].tolist()) > SPINNING
-        self._greatest = [max(self._greatest[0], away), max(self._greatest[1], turned)]
-        if away > REST_POSITION or turned > REST_ANGLE:
+        self._t, self._last = t, self._away(signals)
+        self._spins = math.hypot(*signals["robot.w_WB"].tolist()) > SPINNING
+        self._greatest = [max(both) for both in zip(self._greatest, self._last, strict=True)]
+        if self._last[0] > REST_POSITION or self._last[1] > REST_ANGLE:
             self._astray = t
+
+    @abc.abstractmethod
+    def _away(self, signals: Signals) -> tuple[float, float]:
+        """Return how far the gripper is from its rest, m and rad."""
 
     @property
     def over(self) -> bool:
-        """Whether the robot has come to rest after the push, or spins out of control."""
+        """Whether the gripper has come to rest after the push, or the robot spins out of control."""
         return self._spins or self._at_rest
 
     @property
@@ -269,36 +270,96 @@ class ImpedanceEvaluator(Evaluator):
     def _settled(self) -> float:
         return max(0.0, self._astray - self._end)
 
-    def errors(self) -> Errors:
-        """Return the errors, actual and by the model."""
-        t, *columns = (np.array(column) for column in zip(*self._rows, strict=True))
-        signals: dict[str, Floats] = dict(zip((*MOTION_SIGNALS, *HAND_SIGNALS), columns, strict=True))
-        return errors_of(Motion.of(signals, t), self.p_WG_goal, self.parameters.behaviour, self._model)
-
     def outcome(self) -> Outcome:
-        """Return whether the robot rests again and agreed with the model, why, and the metrics."""
+        """Return whether the gripper rests again and agreed with the model, why, and the metrics."""
         if len(self._rows) < 2:
             return Outcome(success=False, reason="stopped before the first step")
-        by = self.errors().disagreement
-        published = paper_values("free_flyer", "published")["model_agreement"]
-        agrees = by[0] <= published[0] and by[1] <= published[1]
-        share = self._saturated / len(self._rows)
+        motion = self._motion()
+        by = self._errors(motion).disagreement
+        bounds = paper_values("free_flyer", "published")["model_agreement"]
+        agrees = by[0] <= bounds[0] and by[1] <= bounds[1]
+        reason = self._reason(motion, by, agrees=agrees) + self._mismatch
+        return Outcome(success=self._at_rest and agrees, reason=reason, metrics=self._metrics(motion, by))
+
+    def _motion(self) -> dict[str, Floats]:
+        columns = (np.array(column) for column in zip(*self._rows, strict=True))
+        return dict(zip(("t", *self.signals, *HAND_SIGNALS), columns, strict=True))
+
+    @abc.abstractmethod
+    def _errors(self, motion: Mapping[str, Floats]) -> Errors:
+        """Return the errors, actual and by the model, of a motion by signal, and its time as `t`."""
+
+    @abc.abstractmethod
+    def _reason(self, motion: Mapping[str, Floats], by: tuple[float, float], *, agrees: bool) -> str:
+        """Return why a run is a success or not: rest, and what errors and the model's differ by, m and rad."""
+
+    @abc.abstractmethod
+    def _metrics(self, motion: Mapping[str, Floats], by: tuple[float, float]) -> dict[str, Metric]:
+        """Return the metrics, see `_push_metrics`."""
+
+    def _push_metrics(
+        self, by: tuple[float, float], model: str, rest: str, own: Mapping[str, Metric] = MappingProxyType({})
+    ) -> dict[str, Metric]:
+        """Return the metrics of every push, with a subclass's own among them.
+
+        Args:
+            by: what errors and the model's differ by, m and rad.
+            model: its equation.
+            rest: where the gripper is to stay, as a clause.
+            own: metrics.
+        """
+        apart = "actual against calculated {} error at most, " + model
         metrics = {
             "greatest_position_error": Metric(self._greatest[0], "m", "gripper from its place of rest at most"),
             "greatest_orientation_error": Metric(self._greatest[1], "rad", "gripper from its rest orientation at most"),
-            "disagreement_position": Metric(by[0], "m", f"actual against calculated position error at most, {_MODEL}"),
-            "disagreement_orientation": Metric(
-                by[1], "rad", f"actual against calculated orientation error at most, {_MODEL}"
-            ),
-            "saturated_share": Metric(share, "1", SATURATED_SHARE),
+            **own,
+            "disagreement_position": Metric(by[0], "m", apart.format("position")),
+            "disagreement_orientation": Metric(by[1], "rad", apart.format("orientation")),
+            "saturated_share": Metric(self._saturated / len(self._rows), "1", SATURATED_SHARE),
             **self._stability,
         }
         if self._at_rest:
-            text = f"from the end of the push until the gripper stays within {_BAND} of its rest"
+            text = f"from the end of the push until the gripper stays {rest}"
             metrics["settling_time"] = Metric(self._settled, "s", text)
-        return Outcome(success=self._at_rest and agrees, reason=self._reason(agrees, by, share), metrics=metrics)
+        return metrics
 
-    def _reason(self, agrees: bool, by: tuple[float, float], share: float) -> str:
+
+class ImpedanceEvaluator(PushEvaluator[ImpedanceParameters]):
+    """Follows one push of a robot whose arm is rigid.
+
+    Raises:
+        KeyError: `paper.toml` lacks the place of rest.
+    """
+
+    records = (Metric, Body)
+    signals = MOTION_SIGNALS
+
+    def __init__(self, parameters: ImpedanceParameters) -> None:
+        super().__init__(parameters)
+        self.p_WG_goal = np.array(paper_values("free_flyer", "push_place")["p_WG_goal"])
+        self._model = parameters.model
+
+    def note_units(self, units: Mapping[str, PlacedUnit]) -> None:
+        """Keep what the controller takes the robot to be, and what it does not know of it."""
+        super().note_units(units)
+        if "impedance" in units:
+            self._model = assumed_body(units["impedance"], self._model)
+
+    def _away(self, signals: Signals) -> tuple[float, float]:
+        away = math.dist(signals["robot.p_WG"].tolist(), self.p_WG_goal.tolist())
+        return away, 2.0 * math.acos(min(1.0, abs(float(signals["robot.q_WB"][0]))))
+
+    def errors(self) -> Errors:
+        """Return the errors, actual and by the model."""
+        return self._errors(self._motion())
+
+    def _errors(self, motion: Mapping[str, Floats]) -> Errors:
+        return errors_of(Motion.of(motion, motion["t"]), self.p_WG_goal, self.parameters.behaviour, self._model)
+
+    def _metrics(self, motion: Mapping[str, Floats], by: tuple[float, float]) -> dict[str, Metric]:  # noqa: ARG002
+        return self._push_metrics(by, _MODEL, f"within {_BAND} of its rest")
+
+    def _reason(self, motion: Mapping[str, Floats], by: tuple[float, float], *, agrees: bool) -> str:  # noqa: ARG002
         far = f"{1000 * by[0]:.1f} mm" if by[0] < 1.0 else f"{by[0]:.1f} m"
         apart = f"{far} and {math.degrees(by[1]):.2f}°"
         model = (
@@ -307,8 +368,9 @@ class ImpedanceEvaluator(Evaluator):
             else f"departed from the impedance model by {apart}, {agreement_bound()}"
         )
         joined = "and" if agrees is self._at_rest else "but"
+        share = self._saturated / len(self._rows)
         thrust = f"; more was commanded than the thrusters give for {100 * share:.0f} % of the time" if share else ""
-        return f"{self._back()}{'' if self._at_rest and agrees else ','} {joined} {model}{thrust}{self._mismatch}"
+        return f"{self._back()}{'' if self._at_rest and agrees else ','} {joined} {model}{thrust}"
 
     def _back(self) -> str:
         """Return whether the gripper came back to rest, as a clause of the reason."""
