@@ -137,3 +137,22 @@ def segments_of(path: Path, x_0: Floats, x_g: Floats) -> Sequence[Segment]:
 
 def _xz(x: float, z: float) -> Floats:
     return np.array([x, 0.0, z])
+
+
+class Departure:
+    """When the tip sets off: it has waited for some periods, and `go` is true; the periods since then are counted."""
+
+    def __init__(self, wait: float) -> None:
+        self._wait = wait
+        self.state: tuple[int, int | None] = 0, None
+        """Periods waited, and those since it set off; None before."""
+
+    def periods(self, *, go: bool) -> int | None:
+        """Return the periods since it set off, 0 if it does here, None if it does not yet."""
+        waited, since = self.state
+        return 0 if since is None and waited >= self._wait and go else since
+
+    def pass_period(self, *, go: bool) -> None:
+        """Go to the end of a period, at whose beginning `go` was so."""
+        waited, since = self.state[0], self.periods(go=go)
+        self.state = (waited + 1, None) if since is None else (waited, since + 1)

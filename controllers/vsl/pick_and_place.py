@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from handover.controllers.vsl.kinematics import ArmParameters, VslKinematics, format_point
-from handover.controllers.vsl.paths import Line
+from handover.controllers.vsl.paths import Departure, Line
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.origins import assumed
 from handover.cosim.blocks.ports import Floats, Vector2, Vector3, output, parameter, port
@@ -192,38 +192,25 @@ class PickAndPlace:
         """In which period each part but the first ends, counted from when the arm begins to come down."""
         for part in self._parts:
             self._add(part)
-        self._waited = 0
-        self._periods: int | None = None
-        """Periods since the arm began to come down."""
+        self._departure = Departure(round(p.settle / float(_PERIOD)))
 
     def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Return the command that a step from here would begin with."""
-        return self._command(self._periods_of_task(u))
+        return self._command(self._departure.periods(go=u.go))
 
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Return the command that holds until t + dt."""
-        periods = self._periods_of_task(u)
-        y = self._command(periods)
-        if periods is None:
-            self._waited += 1
-        else:
-            self._periods = periods + 1
+        y = self.outputs(t, u)
+        self._departure.pass_period(go=u.go)
         return y
 
     def get_state(self) -> bytes:
         """Return the periods waited, and those of the task."""
-        return pack_state((self._waited, self._periods))
+        return pack_state(self._departure.state)
 
     def set_state(self, state: bytes) -> None:
         """Restore a state of this unit or of one with equal parameters."""
-        self._waited, self._periods = unpack_state(state)
-
-    def _periods_of_task(self, u: Inputs) -> int | None:
-        """Return the periods since the arm began to come down, 0 if it does here, None if it does not yet."""
-        if self._periods is not None:
-            return self._periods
-        settled = self._waited >= round(self._params.settle / float(_PERIOD))
-        return 0 if settled and u.go else None
+        self._departure.state = unpack_state(state)
 
     def _command(self, periods: int | None) -> Outputs:
         p, last = self._params, len(self._points) - 1

@@ -11,7 +11,7 @@ from typing import ClassVar
 import numpy as np
 
 from handover.controllers.vsl.kinematics import ArmParameters, Elbow, VslKinematics, format_point
-from handover.controllers.vsl.paths import Path, Segment, segments_of
+from handover.controllers.vsl.paths import Departure, Path, Segment, segments_of
 from handover.controllers.vsl.waypoints import InvalidWaypoints, read_waypoints
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.origins import assumed, stated
@@ -166,38 +166,25 @@ class TrajectoryPlanner:
         self._x_0, self._q_0 = segments[0].x_0, self._kinematics.inverse(segments[0].x_0)
         for segment in segments:
             self._add(segment)
-        self._waited = 0
-        self._periods: int | None = None
-        """Periods since the path began."""
+        self._departure = Departure((p.settle - _SAME_TIME) / float(_PERIOD))
 
     def outputs(self, t: float, u: Inputs) -> Outputs:
         """Return the command that a step from here would begin with."""
-        return self._command(t, self._periods_on_path(u))
+        return self._command(t, self._departure.periods(go=u.go))
 
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Return the command that holds until t + dt."""
-        periods = self._periods_on_path(u)
-        y = self._command(t, periods)
-        if periods is None:
-            self._waited += 1
-        else:
-            self._periods = periods + 1
+        y = self.outputs(t, u)
+        self._departure.pass_period(go=u.go)
         return y
 
     def get_state(self) -> bytes:
         """Return the periods waited, and those since the path began."""
-        return pack_state((self._waited, self._periods))
+        return pack_state(self._departure.state)
 
     def set_state(self, state: bytes) -> None:
         """Restore a state of this planner or of one with equal parameters."""
-        self._waited, self._periods = unpack_state(state)
-
-    def _periods_on_path(self, u: Inputs) -> int | None:
-        """Return the periods since the path began, 0 if it begins here, None if it does not yet."""
-        if self._periods is not None:
-            return self._periods
-        settled = self._waited * float(_PERIOD) >= self._params.settle - _SAME_TIME
-        return 0 if settled and u.go else None
+        self._departure.state = unpack_state(state)
 
     def _command(self, t: float, periods: int | None) -> Outputs:
         p = self._params
