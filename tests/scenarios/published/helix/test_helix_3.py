@@ -14,7 +14,7 @@ def table_of(failed: int = 0) -> CampaignTable:
     """Return the plan's runs, the first so many of the thesis's failed."""
     reasons = ("the ball rests in the bowl", "the ball missed the bowl by 0.010 m: it fell")
     return made_table(
-        {"tuning": run.parameters["tuning"], "place": run.parameters["place"], "status": "done", "run": f"{k:03}"}
+        {**run.parameters, "status": "done", "run": f"{k:03}"}
         | {"success": k >= failed, "reason": reasons[k < failed], "drop_offset": 0.01 + 1e-4 * k}
         | {"arm_time": 40.0 + k, "carry_time": 50.0, "task_time": 110.0}
         for k, run in enumerate(Helix3().plan(quick=False).runs())
