@@ -93,6 +93,16 @@ class Runs:
         """Return the runs to keep."""
         return Runs(filter(keep, self.rows), self._defaults)
 
+    @property
+    def successful(self) -> "Runs":
+        """Those that came to their end and succeeded."""
+        return self.where(lambda row: is_done(row) and bool(row["success"]))
+
+    @property
+    def failed(self) -> "Runs":
+        """Those that came to their end and did not succeed."""
+        return self.where(lambda row: is_done(row) and not row["success"])
+
     def together_with(self, *others: "Runs") -> "Runs":
         """Return these runs and then others."""
         return Runs([row for runs in (self, *others) for row in runs], self._defaults)

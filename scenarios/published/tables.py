@@ -29,6 +29,12 @@ def span(values: Floats, form: str = ".1f", to: str = " to ") -> str:
     return low if low == high else f"{low}{to}{high}"
 
 
+def median_and_range(values: Floats) -> str:
+    """Return the median, and the least and the greatest in brackets, as text; "" of none."""
+    median, low, high = (number(values, ".1f", statistic) for statistic in (np.median, np.min, np.max))
+    return f"{median} ({low} to {high})" if len(values) else ""
+
+
 def of(count: Count) -> str:
     """Return a count such as `11 of 15`."""
     return f"{count[0]} of {count[1]}"

@@ -449,7 +449,7 @@ _NOTE_ON_TRANSFERS = (
 
 
 def _transfer(exchange: Exchange, behaviour: Behaviour, propulsion: Propulsion, runs: Runs) -> dict[str, str]:
-    done = runs.where(lambda row: is_done(row) and bool(row["success"]))
+    done = runs.successful
     shown = done if len(done) else runs
     cells = {f"{name}, mm": number(1e3 * exchange.of(shown, f"displacement{axis}"), ".0f")
              for name, axis in (("along x", "_x"), ("along y", "_y"), ("along z", "_z"), ("in all", ""))}  # fmt: skip
@@ -489,8 +489,7 @@ def _varied(runs: HandoverRuns, label: str, variation: Variation, propulsion: Pr
     found = {b.item: runs.of(GIVING.task, b, propulsion, variation) for b in Behaviour}
     if not all(map(len, found.values())):
         return {}
-    done = {b: r.where(lambda row: is_done(row) and bool(row["success"])) for b, r in found.items()}
-    away = {b: GIVING.of(r, "displacement_z") for b, r in done.items()}
+    away = {b: GIVING.of(r.successful, "displacement_z") for b, r in found.items()}
     rigid, compliant = away.values()
     ratio = f"{np.median(compliant) / np.median(rigid):.1f}" if len(rigid) and len(compliant) else ""
     shares = [number(100.0 * r.metric("saturated_share"), ".0f") for r in found.values()]

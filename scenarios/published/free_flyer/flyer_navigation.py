@@ -37,7 +37,7 @@ from handover.scenarios.published.free_flyer.handovers import (
 )
 from handover.scenarios.published.free_flyer.linear_model import linear_loop
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment
-from handover.scenarios.published.runs import Runs, is_done, is_known
+from handover.scenarios.published.runs import Runs, is_known
 from handover.scenarios.published.tables import number, of, table_of
 from handover.scenarios.published.verdicts import (
     every_claim,
@@ -318,7 +318,7 @@ def _row(runs: Runs, variation: Variation) -> dict[str, str]:
     found = every_of([*by_task.values()])
     if not len(found):
         return {}
-    decided = [Cause(int(row["decided_by"])) for row in found if is_done(row) and not row["success"]]
+    decided = [Cause(int(row["decided_by"])) for row in found.failed]
     cause = max(set(decided), key=lambda c: (decided.count(c), -c)).words if decided else ""
     return {
         "navigation": variation.label,

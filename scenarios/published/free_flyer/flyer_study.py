@@ -30,7 +30,7 @@ from handover.scenarios.published.claims import Statement
 from handover.scenarios.published.figures import Drawable, Mark, Panel, drawn, level
 from handover.scenarios.published.free_flyer.handovers import STUDIED, TASKS, published_failures, unfinished_note
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment
-from handover.scenarios.published.runs import Count, Point, Runs, is_done, is_known
+from handover.scenarios.published.runs import Count, Point, Runs, is_known
 from handover.scenarios.published.tables import of, table_of
 from handover.scenarios.published.verdicts import (
     format_interval,
@@ -252,7 +252,7 @@ def failures(runs: Runs | None) -> Count:
 
 def causes(runs: Runs) -> Counter[Cause]:
     """Return what decided the trials that failed, with how often; one that did not come to its end has no cause."""
-    return Counter(Cause(int(row["decided_by"])) for row in runs if is_done(row) and not row["success"])
+    return Counter(Cause(int(row["decided_by"])) for row in runs.failed)
 
 
 def _interval_by_person(by_person: Mapping[int, Runs]) -> str:

@@ -172,9 +172,10 @@ class Arm:
         return "_fitted" if self.fitted else ""
 
     @property
-    def every(self) -> list[Row]:
-        """All rows."""
-        return [row for runs in self.rows.values() for row in runs]
+    def every(self) -> Runs:
+        """All runs."""
+        first, *others = self.rows.values()
+        return first.together_with(*others)
 
     @property
     def tried(self) -> int:
@@ -217,12 +218,11 @@ def _on_fitted_arm(claims: Sequence[Claim]) -> list[Claim]:
 
 def _rates(arm: Arm) -> list[Claim]:
     k, n = PRINTED["success"]
-    closed = sum(row.get("arm_time") is not None for row in arm.every)
-    succeeded = sum(bool(row["success"]) for row in arm.every)
+    closed = len(arm.every.metric("arm_time"))
     return [
         every_claim("The arm reaches the ball and the gripper begins to close in every run", "sec. 4", (k, n),
                     (closed, arm.tried), _broken(arm)),
-        every_claim("Every handover succeeds", "sec. 4", (k, n), (succeeded, arm.tried), _broken(arm)),
+        every_claim("Every handover succeeds", "sec. 4", (k, n), arm.every.count, _broken(arm)),
     ]  # fmt: skip
 
 
@@ -392,11 +392,8 @@ def _own_claims(thesis: Arm, own: Arm) -> list[Claim]:
     """Judge this project's claims about its own settings, if there are runs with them."""
     if not own.tried:
         return []
-    taken = [row for row in own.every if row["success"]]
     says = Statement("With our settings the gripper takes the ball nearer to its axis than with the thesis's")
-    theirs, ours = (
-        np.concatenate([runs.metric("grasp_offset_lateral") for runs in arm.rows.values()]) for arm in (thesis, own)
-    )
+    theirs, ours = (arm.every.metric("grasp_offset_lateral") for arm in (thesis, own))
     nearer = says.unknown(f"Too few runs: {len(theirs)} and {len(ours)} balls taken.")
     if min(len(theirs), len(ours)) >= MIN_SAMPLES:
         interval = ratio_interval(ours, theirs, np.median)
@@ -407,8 +404,8 @@ def _own_claims(thesis: Arm, own: Arm) -> list[Claim]:
             interval=interval,
         )
     sentence = "With our settings every handover succeeds"
-    every = every_claim(sentence, "", (0, 0), (len(taken), own.tried), _broken(own))
-    return [every, nearer, ends_near("With our settings", taken)]
+    every = every_claim(sentence, "", (0, 0), own.every.count, _broken(own))
+    return [every, nearer, ends_near("With our settings", own.every)]
 
 
 _ON_EQUAL_BOUNDS = (

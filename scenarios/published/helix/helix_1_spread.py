@@ -22,7 +22,7 @@ from handover.scenarios.published.figures import SOFT, Band, Drawable, Mark, str
 from handover.scenarios.published.helix.helix_cases import Case, levels_of
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable
 from handover.scenarios.published.runs import Runs
-from handover.scenarios.published.tables import of, table_of
+from handover.scenarios.published.tables import median_and_range, of, table_of
 from handover.scenarios.published.verdicts import format_p_value
 
 PRINTED = paper_values("helix", "published")
@@ -80,9 +80,7 @@ def _spread_row(case: Case, runs: Runs) -> dict[str, str]:
         "size": case.size,
         "gripper began to close": of((len(times), len(runs))),
         "ball taken": of(runs.count),
-        "time, median (range), s": f"{np.median(times):.1f} ({times.min():.1f} to {times.max():.1f})"
-        if len(times)
-        else "never",
+        "time, median (range), s": median_and_range(times) or "never",
         "mean, s": f"{np.mean(times):.1f} ± {np.std(times, ddof=1):.1f}" if enough else "",
         "p, mean": p_mean,
         "p, spread": p_spread,
@@ -126,9 +124,9 @@ def draw_spread(found: Mapping[Case, Runs], folder: Path) -> list[Figure]:
     cases: dict[str, Sequence[Drawable]] = {}
     for case, runs in found.items():
         marks: list[Drawable] = []
-        for taken, form, colour, label in ((True, "o", COLOURS[0], "ball taken (bar: median of all)"),
-                                           (False, "x", COLOURS[1], "ball not taken")):  # fmt: skip
-            times = runs.where(lambda row, taken=taken: bool(row["success"]) is taken).metric("arm_time")
+        for of_kind, form, colour, label in ((runs.successful, "o", COLOURS[0], "ball taken (bar: median of all)"),
+                                             (runs.failed, "x", COLOURS[1], "ball not taken")):  # fmt: skip
+            times = of_kind.metric("arm_time")
             marks.append(Mark(times, np.zeros(len(times)), form, colour, label))
         times = runs.metric("arm_time")
         bar = [Mark([np.median(times)] * 2, [-0.3, 0.3], "-", COLOURS[0], style={"lw": 2.0})] if len(times) else []

@@ -1,6 +1,6 @@
 """Guidance by a hand, [Vervloet2025] figs. 11, 12 and 22: a person leads the controlled arm to the ball."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
@@ -22,6 +22,7 @@ from handover.scenarios.published.figures import Mark, Panel, drawn, records_of
 from handover.scenarios.published.helix.helix_1_curves import error_marks, errors_of
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment
 from handover.scenarios.published.runs import Runs
+from handover.scenarios.published.tables import median_and_range, number, of, table_of
 from handover.scenarios.published.verdicts import every_claim, format_p_value
 
 _PATIENCE = 600.0
@@ -33,17 +34,11 @@ _FIGURES = {0.1: "fig. 12", 0.2: "fig. 22"}
 
 @dataclass(frozen=True)
 class GuidedRuns:
-    """Rows of a campaign's table of runs that came to their end at one step size, with guidance and without."""
+    """Runs that came to their end at one step size, with guidance and without."""
 
     alpha: float
-    guided: Sequence[Mapping[str, Any]]
-    alone: Sequence[Mapping[str, Any]]
-
-    @classmethod
-    def of(cls, table: CampaignTable, alpha: float) -> "GuidedRuns":
-        """Pick the rows of a step size."""
-        done = [row for row in table.rows if row["status"] == "done" and row["alpha"] == alpha]
-        return cls(alpha, [r for r in done if r["guidance"] > 0.0], [r for r in done if r["guidance"] == 0.0])
+    guided: Runs
+    alone: Runs
 
 
 class Helix2(PublishedExperiment):
@@ -64,9 +59,8 @@ class Helix2(PublishedExperiment):
         alphas: list[float] = published["guided_alpha"][:1] if quick else published["guided_alpha"]
         unguided = (HandPlace.FRONT,) if quick else tuple(HandPlace)
         ways = [(0.0, place) for place in unguided] + [(setup["guidance"], HandPlace.FRONT)]
-        return CampaignPlan(
-            scenario=self.scenario,
-            points=[
+        return self.campaign(
+            [
                 {
                     "alpha": str(alpha),
                     "control_period": str(periods[alpha]),
@@ -83,54 +77,50 @@ class Helix2(PublishedExperiment):
             },
             repetitions=1 if quick else int(published["guided_runs"]),
             seed=1,
-            experiment=self.name,
         )
 
     def claims(self, table: CampaignTable) -> Sequence[Claim]:
         """Judge that guided handovers succeed, and that they are faster at either step size."""
-        runs, (k, n) = _runs(table), paper_values("helix", "published")["guided_success"]
-        guided = [row for of_alpha in runs for row in of_alpha.guided]
-        succeeded = sum(bool(row["success"]) for row in guided)
+        runs, (k, n) = self._by_alpha(table), paper_values("helix", "published")["guided_success"]
+        first, *others = (of_alpha.guided for of_alpha in runs)
+        guided = first.together_with(*others)
         return [
-            every_claim("Every guided handover succeeds", "sec. 4.3", (k, n), (succeeded, len(guided))),
+            every_claim("Every guided handover succeeds", "sec. 4.3", (k, n), guided.count),
             *(_faster(of_alpha) for of_alpha in runs),
         ]
 
     def tables(self, table: CampaignTable) -> Sequence[ComparisonTable]:
         """Return success and times, guided and not."""
         rows = [
-            [str(r.alpha), what, *_cells(rows)]
-            for r in _runs(table)
-            for what, rows in (("guided", r.guided), ("alone", r.alone))
-            if rows
-        ]
-        header = [
-            "α",
-            "arm",
-            "gripper began to close",
-            "ball taken",
-            "time, median (range), s",
-            "control steps, median",
+            {"α": str(r.alpha), "arm": what, **_cells(runs)}
+            for r in self._by_alpha(table)
+            for what, runs in (("guided", r.guided), ("alone", r.alone))
+            if len(runs)
         ]
         note = (
             "Time until the gripper begins to close; the thesis shows its guided runs in figs. 12 and 22, without "
             "figures. All with the thesis's settings."
         )
-        return [ComparisonTable(title="Guidance by a hand", header=header, rows=rows, note=note)]
+        return [table_of("Guidance by a hand", rows, note)]
 
     def draw(self, table: CampaignTable, runs: Path, folder: Path) -> Sequence[Figure]:
         """Draw the error over time as in figs. 12 and 22, and what the person's hand does."""
-        both = [r for r in _runs(table) if r.guided and r.alone]
+        both = [r for r in self._by_alpha(table) if len(r.guided) and len(r.alone)]
         return [*_draw_errors(both, runs, folder), *_draw_hands(both, runs, folder)] if both else []
 
+    def _by_alpha(self, table: CampaignTable) -> list[GuidedRuns]:
+        runs = self.runs(table)
+        found: list[GuidedRuns] = []
+        for alpha in paper_values("helix", "published")["guided_alpha"]:
+            of_alpha = runs.matching({"alpha": str(alpha)})
+            guided, alone = of_alpha.where(lambda row: row["guidance"] > 0.0), of_alpha.matching({"guidance": "0"})
+            found.append(GuidedRuns(alpha, guided, alone))
+        return found
 
-def _runs(table: CampaignTable) -> list[GuidedRuns]:
-    return [GuidedRuns.of(table, alpha) for alpha in paper_values("helix", "published")["guided_alpha"]]
 
-
-def _times(rows: Sequence[Mapping[str, Any]]) -> Floats:
+def _times(runs: Runs) -> Floats:
     """Return times until the gripper began to close, s; infinity where it never did."""
-    return np.array([np.inf if row.get("arm_time") is None else row["arm_time"] for row in rows], dtype=np.float64)
+    return np.array([np.inf if row.get("arm_time") is None else row["arm_time"] for row in runs], dtype=np.float64)
 
 
 def _faster(runs: GuidedRuns) -> Claim:
@@ -164,22 +154,23 @@ def _seconds(times: Floats) -> str:
     return f"{median:.1f} s" if np.isfinite(median) else "never"
 
 
-def _cells(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    closed = [row for row in rows if row.get("arm_time") is not None]
-    times = _times(closed)
-    shown = f"{np.median(times):.1f} ({times.min():.1f} to {times.max():.1f})" if closed else ""
-    steps = f"{np.median([row['steps'] for row in closed]):.0f}" if closed else ""
-    taken = sum(bool(row["success"]) for row in rows)
-    return [f"{len(closed)} of {len(rows)}", f"{taken} of {len(rows)}", shown, steps]
+def _cells(runs: Runs) -> dict[str, str]:
+    times = runs.metric("arm_time")
+    return {
+        "gripper began to close": of((len(times), len(runs))),
+        "ball taken": of(runs.count),
+        "time, median (range), s": median_and_range(times),
+        "control steps, median": number(runs.metric("steps"), ".0f"),
+    }
 
 
 def _draw_errors(drawn_runs: Sequence[GuidedRuns], runs: Path, folder: Path) -> list[Figure]:
     panels: list[Panel] = []
     for of_alpha in drawn_runs:
         marks: list[Mark] = []
-        for colour, label, rows in ((COLOURS[0], "alone", of_alpha.alone), (COLOURS[1], "guided", of_alpha.guided)):
-            if errors := errors_of(Runs(rows, {}), runs):
-                marks += error_marks(errors, rows[0]["control_period"], colour, label)
+        for colour, label, found in ((COLOURS[0], "alone", of_alpha.alone), (COLOURS[1], "guided", of_alpha.guided)):
+            if errors := errors_of(found, runs):
+                marks += error_marks(errors, found.rows[0]["control_period"], colour, label)
         axes = {"title": f"α = {of_alpha.alpha}", "xlabel": "time (s)", "ylabel": "error (mm)"}
         panels += [Panel(marks, {**axes, "xlim": (0, None), "ylim": (0, None)})] if marks else []
     caption = (
@@ -194,7 +185,7 @@ def _draw_hands(drawn_runs: Sequence[GuidedRuns], runs: Path, folder: Path) -> l
     labels = ("beside the ball (mm)", "above the ball (mm)", "force (N)")
     marks: dict[str, list[Mark]] = {label: [] for label in labels}
     for k, of_alpha in enumerate(drawn_runs):
-        for record in records_of([row["run"] for row in of_alpha.guided], runs):
+        for record in records_of(of_alpha.guided.names, runs):
             apart = 1000 * (record["arm.p_WG"] - record["hand.p_WO"])
             force = np.linalg.norm(record["hand.f_G"], axis=1)
             curves = (np.linalg.norm(apart[:, :2], axis=1), apart[:, 2], force)

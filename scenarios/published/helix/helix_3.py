@@ -127,7 +127,7 @@ def _row(settings: str, runs: Runs) -> dict[str, str]:
         "hand to bowl, s": format_median(runs.metric("carry_time"), 1),
         "whole task, s": format_median(runs.metric("task_time"), 1),
         "beside the bowl's middle, mm": format_median(1000 * runs.metric("drop_offset"), 1),
-        "failed because": reasons_of(runs.rows),
+        "failed because": reasons_of(runs),
     }
 
 

@@ -1,22 +1,17 @@
 """Handovers of the Helix that differ in one thing each, at the same places with the same seeds, and their runs."""
 
-import enum
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
-from typing import Any
 
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
-from handover.scenarios.campaign.plan import is_number
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.paper import paper_values
-from handover.scenarios.helix.helix_handover import HelixHandover
 from handover.scenarios.published.claims import Statement
-from handover.scenarios.published.published_experiment import Claim
-from handover.scenarios.published.runs import values_of
+from handover.scenarios.published.published_experiment import Claim, PublishedExperiment
+from handover.scenarios.published.runs import Runs
 from handover.scenarios.published.verdicts import MIN_FOR_EVERY
 
 OFFERED_AT = [
@@ -74,49 +69,10 @@ def thesis_settings(alpha: float) -> dict[str, str]:
     return {"tuning": "thesis", "alpha": str(alpha), "control_period": str(period), **helped}
 
 
-def rows_by_case(table: CampaignTable, cases: Sequence[Case]) -> dict[Case, list[Mapping[str, Any]]]:
-    """Return the runs that came to their end, by what is different in them, in the order of the cases."""
-    by_values = {frozenset((name, _plain(text)) for name, text in case.parameters.items()): case for case in cases}
-    found: dict[Case, list[Mapping[str, Any]]] = {case: [] for case in cases}
-    for row in table.rows:
-        case = by_values.get(deviations_from_defaults(row, cases))
-        if case is not None and row["status"] == "done":
-            found[case].append(row)
-    return found
-
-
-def deviations_from_defaults(row: Mapping[str, Any], cases: Sequence[Case]) -> frozenset[tuple[str, float | str]]:
-    """Return what a row has otherwise than the scenario's defaults, of all that the cases set.
-
-    A unit's parameter has no default: any value of it counts. None and NaN are no values.
-    """
-    names = {name for case in cases for name in case.parameters}
-    given = [(name, _plain(row[name])) for name in names if row.get(name) not in (None, "")]
-    return frozenset((name, x) for name, x in given if x == x and x != _defaults().get(name))
-
-
-@cache
-def _defaults() -> Mapping[str, Any]:
-    """Return the values of the scenario's parameters where none is set."""
-    return {v.name: _plain(v.start) for v in HelixHandover.parameters() if not v.shape}
-
-
-def _plain(value: Any) -> float | str:
-    """Return a value as a number or a text: that of a table, of a text, or of an enumeration."""
-    if isinstance(value, enum.IntEnum):
-        return value.name.lower()
-    return float(value) if is_number(str(value)) else str(value)
-
-
-def distances(rows: Sequence[Mapping[str, Any]], success: bool, metric: str = "final_distance") -> Floats:
-    """Return distances, m, of the runs that succeeded, or of those that did not."""
-    values = [row.get(metric) for row in rows if row["success"] is success]
-    return np.array([v for v in values if v is not None], dtype=np.float64)
-
-
-def rate(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Return how many of the runs succeeded, as text."""
-    return f"{sum(bool(row['success']) for row in rows)} of {len(rows)}"
+def runs_by_case(experiment: PublishedExperiment, table: CampaignTable, cases: Sequence[Case]) -> dict[Case, Runs]:
+    """Return the runs that came to their end, wherever the ball was offered, by what is different in them."""
+    runs = experiment.runs(table, free=tuple(OFFERED_AT[0]))
+    return {case: runs.of(case.parameters) for case in cases}
 
 
 def median_and_most(values: Floats) -> str:
@@ -124,15 +80,9 @@ def median_and_most(values: Floats) -> str:
     return f"{1e3 * np.median(values):.1f} ({1e3 * values.max():.1f})" if len(values) else ""
 
 
-def median_steps(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Return the median of the control steps of the runs that succeeded, as text."""
-    steps = [row["steps"] for row in rows if row["success"] and row.get("steps") is not None]
-    return f"{np.median(steps):.0f}" if steps else ""
-
-
-def reasons_of(rows: Sequence[Mapping[str, Any]]) -> str:
+def reasons_of(runs: Runs) -> str:
     """Return why runs failed, the frequent reasons first, with how often."""
-    reasons = Counter(_reason(str(row["reason"])) for row in rows if not row["success"])
+    reasons = Counter(_reason(str(row["reason"])) for row in runs.failed)
     return "; ".join(f"{reason} ({n})" if n > 1 else reason for reason, n in reasons.most_common())
 
 
@@ -157,15 +107,15 @@ NEAR = 0.005
 """How near to the ball the gripper is to end, m."""
 
 
-def ends_near(when: str, taken: Sequence[Mapping[str, Any]]) -> Claim:
+def ends_near(when: str, runs: Runs) -> Claim:
     """Judge how far the gripper is from the ball at the end of handovers that succeeded.
 
     Args:
         when: circumstances, in words, with which the claim begins.
-        taken: rows of their runs.
+        runs: those that succeeded count.
     """
     says = Statement(f"{when} the gripper ends within {1e3 * NEAR:.0f} mm of the ball")
-    d = values_of(taken, "final_distance")
+    d = runs.successful.metric("final_distance")
     if not len(d):
         return says.unknown("Too few runs: no handover succeeded.")
     return says.judged(

@@ -3,9 +3,9 @@
 [Vervloet2025] has no such experiment; sec. 5.4 names camera places, filters and step rules as what could be changed.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -18,16 +18,15 @@ from handover.scenarios.published.figures import Mark, strips
 from handover.scenarios.published.helix.helix_cases import (
     OFFERED_AT,
     Case,
-    distances,
     ends_near,
     levels_of,
     median_and_most,
-    median_steps,
-    rate,
     reasons_of,
-    rows_by_case,
+    runs_by_case,
 )
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment
+from handover.scenarios.published.runs import Runs
+from handover.scenarios.published.tables import number, of, table_of
 from handover.scenarios.published.verdicts import every_claim
 
 _QUICK_PLACES, _QUICK_CASES = 1, ("nothing", "light", "arm's stiffness")
@@ -84,51 +83,37 @@ class HelixDisturbances(PublishedExperiment):
         """Return every case at every place; if quick, a part of it."""
         cases = [c for c in CASES if c.what in _QUICK_CASES] if quick else CASES
         places = OFFERED_AT[:_QUICK_PLACES] if quick else OFFERED_AT
-        return CampaignPlan(
-            scenario=self.scenario,
-            points=[{**place, **case.parameters} for case in cases for place in places],
+        return self.campaign(
+            [{**place, **case.parameters} for case in cases for place in places],
             seed=16,
             paired=True,
             scenes=tuple(OFFERED_AT[0]),
             units={"arm": "TendonArmFast"},
-            experiment=self.name,
         )
 
     def claims(self, table: CampaignTable) -> Sequence[Claim]:
         """Judge whether mild disturbances are tolerated, and how near the gripper ends."""
-        runs = [row for case, rows in rows_by_case(table, CASES).items() if case.mild for row in rows]
-        taken = [row for row in runs if row["success"]]
-        tolerated = every_claim("The Helix succeeds with each mild disturbance", "", (0, 0), (len(taken), len(runs)))
-        return [tolerated, ends_near("With a mild disturbance", taken)]
+        nothing, *others = [runs for case, runs in runs_by_case(self, table, CASES).items() if case.mild]
+        runs = nothing.together_with(*others)
+        tolerated = every_claim("The Helix succeeds with each mild disturbance", "", (0, 0), runs.count)
+        return [tolerated, ends_near("With a mild disturbance", runs)]
 
     def tables(self, table: CampaignTable) -> Sequence[ComparisonTable]:
         """Return success, distance and steps by case, and why handovers failed."""
-        rows = [_row(case, rows) for case, rows in rows_by_case(table, CASES).items() if rows]
-        return [
-            ComparisonTable(
-                title="One disturbance at a time",
-                header=[
-                    "disturbance",
-                    "size",
-                    "success",
-                    "closes at, mm",
-                    "ends at, mm",
-                    "steps",
-                    "failed because",
-                ],
-                rows=rows,
-                note="All at the same places, with the same seeds. Distances are between gripper and ball when the "
-                "gripper begins to close and at the end, by ground truth. They are medians of the handovers that "
-                "succeeded, with the largest in brackets. Steps are control steps until the gripper begins to close.",
-            )
-        ]
+        rows = [_row(case, runs) for case, runs in runs_by_case(self, table, CASES).items() if len(runs)]
+        note = (
+            "All at the same places, with the same seeds. Distances are between gripper and ball when the gripper "
+            "begins to close and at the end, by ground truth. They are medians of the handovers that succeeded, with "
+            "the largest in brackets. Steps are control steps until the gripper begins to close."
+        )
+        return [table_of("One disturbance at a time", rows, note)]
 
     def draw(self, table: CampaignTable, runs: Path, folder: Path) -> Sequence[Figure]:  # noqa: ARG002
         """Draw the final distances by case."""
         cases: dict[str, Sequence[Mark]] = {}
-        for case, rows in rows_by_case(table, CASES).items():
-            if rows:
-                taken, missed = (1e3 * distances(rows, success) for success in (True, False))
+        for case, found in runs_by_case(self, table, CASES).items():
+            if len(found):
+                taken, missed = (1e3 * those.metric("final_distance") for those in (found.successful, found.failed))
                 cases[case.label] = (
                     Mark(taken, np.zeros(len(taken)), "o", COLOURS[0], "the gripper has the ball"),
                     Mark(missed, np.zeros(len(missed)), "x", COLOURS[1], "it has not"),
@@ -141,13 +126,14 @@ class HelixDisturbances(PublishedExperiment):
         return strips(folder / "disturbances", caption, cases, axes)
 
 
-def _row(case: Case, rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    return [
-        case.what,
-        case.size,
-        rate(rows),
-        median_and_most(distances(rows, success=True, metric="closing_distance")),
-        median_and_most(distances(rows, success=True)),
-        median_steps(rows),
-        reasons_of(rows),
-    ]
+def _row(case: Case, runs: Runs) -> dict[str, str]:
+    taken = runs.successful
+    return {
+        "disturbance": case.what,
+        "size": case.size,
+        "success": of(runs.count),
+        "closes at, mm": median_and_most(taken.metric("closing_distance")),
+        "ends at, mm": median_and_most(taken.metric("final_distance")),
+        "steps": number(taken.metric("steps"), ".0f"),
+        "failed because": reasons_of(runs),
+    }

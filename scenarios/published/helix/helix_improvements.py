@@ -21,15 +21,14 @@ from handover.scenarios.published.figures import Mark, strips
 from handover.scenarios.published.helix.helix_cases import (
     OFFERED_AT,
     Case,
-    rate,
     reasons_of,
-    rows_by_case,
+    runs_by_case,
     thesis_settings,
 )
 from handover.scenarios.published.helix.helix_places import random_places
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment
-from handover.scenarios.published.runs import Row
-from handover.scenarios.published.tables import table_of
+from handover.scenarios.published.runs import Runs
+from handover.scenarios.published.tables import of, table_of
 from handover.scenarios.published.verdicts import format_p_value
 
 _RANDOM_PLACES, _SEED = 12, 54
@@ -113,12 +112,12 @@ class HelixImprovements(PublishedExperiment):
 
     def claims(self, table: CampaignTable) -> Sequence[Claim]:
         """Judge for each change whether the gripper closes nearer to the ball with it."""
-        return [_closes_nearer(change, *runs_of) for change, runs_of in _runs(table).items()]
+        return [_closes_nearer(change, *runs_of) for change, runs_of in self._runs(table).items()]
 
     def tables(self, table: CampaignTable) -> Sequence[ComparisonTable]:
         """Return success, distance and steps with each change beside those without it."""
-        cells = [_row(x, *runs_of) for x, runs_of in _runs(table).items() if runs_of[1]]
-        tried = max((len(before) for before, _ in _runs(table).values()), default=0)
+        cells = [_row(x, *runs_of) for x, runs_of in self._runs(table).items() if len(runs_of[1])]
+        tried = max((len(before) for before, _ in self._runs(table).values()), default=0)
         note = (
             f"Without and with the change, at {counted(tried, 'place')} with the same seeds. Distance is that of "
             "gripper and ball, by ground truth, when the gripper begins to close; steps are control steps until then. "
@@ -130,7 +129,7 @@ class HelixImprovements(PublishedExperiment):
     def draw(self, table: CampaignTable, runs: Path, folder: Path) -> Sequence[Figure]:  # noqa: ARG002
         """Draw the distances of each pair."""
         cases: dict[str, Sequence[Mark]] = {}
-        for change, runs_of in _runs(table).items():
+        for change, runs_of in self._runs(table).items():
             d = 1e3 * pairs(*runs_of, "closing_distance")
             if len(d):
                 beside = (-0.15, 0.15)
@@ -146,14 +145,13 @@ class HelixImprovements(PublishedExperiment):
         axes = {"xscale": "log", "xlabel": "distance at closing (mm)"}
         return strips(folder / "improvements", caption, cases, axes, x_ticks={x: f"{x:g}" for x in _TICKS})
 
+    def _runs(self, table: CampaignTable) -> dict[Change, tuple[Runs, Runs]]:
+        """Return the runs without and with each change."""
+        found = {_key(case): runs for case, runs in runs_by_case(self, table, _CASES).items()}
+        return {x: (found[_key(x.without)], found[_key(x.changed)]) for x in CHANGES}
 
-def _runs(table: CampaignTable) -> dict[Change, tuple[Sequence[Row], Sequence[Row]]]:
-    """Return the runs without and with each change."""
-    found = {_key(case): rows for case, rows in rows_by_case(table, _CASES).items()}
-    return {x: (found[_key(x.without)], found[_key(x.changed)]) for x in CHANGES}
 
-
-def pairs(before: Sequence[Row], after: Sequence[Row], metric: str) -> Floats:
+def pairs(before: Runs, after: Runs, metric: str) -> Floats:
     """Return a metric's values without and with a change, shape (n, 2), of the places at which both have it."""
     place = tuple(OFFERED_AT[0])
     changed = {tuple(row[name] for name in place): row for row in after}
@@ -171,13 +169,13 @@ def _p_value(d: Floats) -> float:
     return float(stats.wilcoxon(difference).pvalue) if np.any(difference) else 1.0
 
 
-def _row(change: Change, before: Sequence[Row], after: Sequence[Row]) -> dict[str, str]:
+def _row(change: Change, before: Runs, after: Runs) -> dict[str, str]:
     d, steps = (pairs(before, after, metric) for metric in ("closing_distance", "steps"))
     return {
         "settings": change.settings,
         "change": change.what,
         "sec.": change.section,
-        "success": f"{rate(before)} → {rate(after)}",
+        "success": f"{of(before.count)} → {of(after.count)}",
         "closes at, mm": " → ".join(f"{1e3 * x:.1f}" for x in np.median(d, axis=0)) if len(d) else "",
         "p": format_p_value(_p_value(d)) if len(d) else "",
         "control steps": " → ".join(f"{x:.0f}" for x in np.median(steps, axis=0)) if len(steps) else "",
@@ -185,23 +183,21 @@ def _row(change: Change, before: Sequence[Row], after: Sequence[Row]) -> dict[st
     }
 
 
-def _closes_nearer(change: Change, before: Sequence[Row], after: Sequence[Row]) -> Claim:
+def _closes_nearer(change: Change, before: Runs, after: Runs) -> Claim:
     says = Statement(
         f"With {change.settings}, the gripper closes nearer to the ball: {change.what}",
         f"sec. {change.section}",
         "suggested",
     )
-    if not (before and after):
+    if not (len(before) and len(after)):
         return says.unknown("It was not tried.")
     d = pairs(before, after, "closing_distance")
     if not len(d):
         return says.unknown("At no place did the gripper close both without and with it.")
     p, least, medians = _p_value(d), 2.0 ** (1 - len(d)), 1e3 * np.median(d, axis=0)
-    successes = [sum(bool(row["success"]) for row in rows) for rows in (before, after)]
     return says.judged(
-        f"{medians[0]:.1f} mm without, {medians[1]:.1f} mm with it; "
-        f"{successes[0]} of {len(before)} and {successes[1]} of {len(after)} succeed",
-        p < LEVEL and bool(medians[1] < medians[0]) and successes[1] >= successes[0],
+        f"{medians[0]:.1f} mm without, {medians[1]:.1f} mm with it; {of(before.count)} and {of(after.count)} succeed",
+        p < LEVEL and bool(medians[1] < medians[0]) and after.count[0] >= before.count[0],
         "the median distance is less, Wilcoxon's signed-rank test of the pairs, two-sided, rejects that nothing "
         f"changes (p = {format_p_value(p)}, {counted(len(d), 'pair')}; {format_p_value(least)} at least), and no fewer "
         "handovers succeed",

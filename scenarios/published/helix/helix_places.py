@@ -15,9 +15,9 @@ from handover.scenarios.experiment.plotting import COLOURS
 from handover.scenarios.helix.workspace import random_place, reach
 from handover.scenarios.published.claims import Statement
 from handover.scenarios.published.figures import Mark, Panel, drawn
-from handover.scenarios.published.helix.helix_cases import distances, reasons_of
+from handover.scenarios.published.helix.helix_cases import reasons_of
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment
-from handover.scenarios.published.runs import Row, is_done, values_of
+from handover.scenarios.published.runs import Runs
 from handover.scenarios.published.tables import table_of
 from handover.scenarios.published.verdicts import format_rate
 
@@ -55,12 +55,12 @@ class HelixPlaces(PublishedExperiment):
 
     def claims(self, table: CampaignTable) -> Sequence[Claim]:
         """Judge success and exactness."""
-        rows = [row for row in table.rows if is_done(row)]
-        return [_succeeds(rows), _is_near(rows)]
+        runs = self.runs(table)
+        return [_succeeds(runs), _is_near(runs.successful)]
 
     def tables(self, table: CampaignTable) -> Sequence[ComparisonTable]:
         """Return each place where the handover failed, and why."""
-        failed = [row for row in table.rows if is_done(row) and not row["success"]]
+        runs = self.runs(table)
         rows = [
             {
                 "azimuth, rad": f"{row['azimuth']:.2f}",
@@ -68,19 +68,16 @@ class HelixPlaces(PublishedExperiment):
                 "height, m": f"{row['height']:.3f}",
                 "failed because": row["reason"],
             }
-            for row in failed
+            for row in runs.failed
         ]
-        return [table_of("Places where the handover failed", rows, f"In short: {reasons_of(failed) or 'none failed'}.")]
+        return [table_of("Places where the handover failed", rows, f"In short: {reasons_of(runs) or 'none failed'}.")]
 
     def draw(self, table: CampaignTable, runs: Path, folder: Path) -> Sequence[Figure]:  # noqa: ARG002
         """Draw success by place, and the distances."""
-        rows = [row for row in table.rows if is_done(row)]
+        found = self.runs(table)
         over = [
-            Mark(
-                1e3 * values_of(of, "radius"), 1e3 * values_of(of, "height"), form, colour, label, style={"alpha": 0.8}
-            )
-            for taken, form, colour, label in ((True, "o", COLOURS[0], "taken"), (False, "x", COLOURS[1], "not taken"))
-            for of in [[row for row in rows if row["success"] is taken]]
+            Mark(1e3 * of.metric("radius"), 1e3 * of.metric("height"), form, COLOURS[k], label, style={"alpha": 0.8})
+            for k, (of, form, label) in enumerate(((found.successful, "o", "taken"), (found.failed, "x", "not taken")))
         ]
         known: list[float] = paper_values("helix", "reach")["height"]
         heights = np.linspace(min(known), max(h for h in known if reach(h) > 0.0), 50)
@@ -90,7 +87,7 @@ class HelixPlaces(PublishedExperiment):
         for k, (metric, label) in enumerate(
             {"closing_distance": "as it begins to close", "final_distance": "at the end"}.items()
         ):
-            d = 1e3 * np.sort(distances(rows, success=True, metric=metric))
+            d = 1e3 * np.sort(found.successful.metric(metric))
             part = np.arange(1, len(d) + 1) / max(1, len(d))
             near.append(Mark(d, part, "-", COLOURS[2 + k], label, style={"drawstyle": "steps-post"}))
         place = {"xlabel": "distance from the arm's axis (mm)", "ylabel": "height in W (mm)", "xlim": (0.0, None)}
@@ -103,11 +100,11 @@ class HelixPlaces(PublishedExperiment):
         return drawn(folder / "places", caption, panels, 2, size=(9.0, 4.3))
 
 
-def _succeeds(rows: Sequence[Row]) -> Claim:
+def _succeeds(runs: Runs) -> Claim:
     says = Statement(f"At least {100 * _LEAST_SUCCESS:.0f} % of handovers within reach succeed")
-    if not rows:
+    k, n = runs.count
+    if not n:
         return says.unknown()
-    k, n = sum(bool(row["success"]) for row in rows), len(rows)
     return says.judged(
         format_rate(k, n),
         k >= _LEAST_SUCCESS * n,
@@ -117,13 +114,13 @@ def _succeeds(rows: Sequence[Row]) -> Claim:
     )
 
 
-def _is_near(rows: Sequence[Row]) -> Claim:
+def _is_near(taken: Runs) -> Claim:
     median, most = 1e3 * _MEDIAN, 1e3 * _MOST
     says = Statement(
         f"As the ball leaves the hand it is {median:.0f} mm from the gripper's middle in the median, {most:.0f} mm at "
         "most"
     )
-    beside, along = (distances(rows, success=True, metric=f"grasp_offset_{name}") for name in ("lateral", "axial"))
+    beside, along = (taken.metric(f"grasp_offset_{name}") for name in ("lateral", "axial"))
     if not len(beside):
         return says.unknown("No handover succeeded.")
     d = np.hypot(beside, along)

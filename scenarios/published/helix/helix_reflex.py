@@ -222,7 +222,7 @@ def _cells(runs: Runs) -> dict[str, str]:
         "success": format_rate(*runs.count) if len(runs) else "",
         "closed": f"{len(closed)}" if len(runs) else "",
         **{head: format_median(x[np.isfinite(x)], 1) for head, x in medians.items()},
-        "failed because": reasons_of(runs.rows),
+        "failed because": reasons_of(runs),
     }
 
 

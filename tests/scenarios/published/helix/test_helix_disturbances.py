@@ -5,7 +5,7 @@ from support.scenarios.handover_columns import columns
 from support.scenarios.made_tables import empty, made_table
 
 from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.published.helix.helix_cases import rows_by_case
+from handover.scenarios.published.helix.helix_cases import runs_by_case
 from handover.scenarios.published.helix.helix_disturbances import CASES, HelixDisturbances
 from handover.scenarios.published.published_experiment import Verdict
 
@@ -25,8 +25,8 @@ def table_of(failing: frozenset[str] = frozenset(), far: float = 0.002) -> Campa
 
 
 def test_every_case_is_run_at_every_place_with_the_seeds_of_that_place():
-    found = rows_by_case(table_of(), CASES)
-    assert [len(rows) for rows in found.values()] == [4] * len(CASES)
+    found = runs_by_case(HelixDisturbances(), table_of(), CASES)
+    assert [len(runs) for runs in found.values()] == [4] * len(CASES)
     runs = PLAN.runs()
     assert len({(run.point % 4, run.seed) for run in runs}) == len({run.seed for run in runs}) == 4
 
