@@ -71,7 +71,7 @@ def _positions(record: Record, phases: Sequence[Phase]) -> list[TimePlot]:
 
 
 def _orientations(record: Record, phases: Sequence[Phase]) -> list[TimePlot]:
-    followed = {name: _angles(record[signal.format("q")]) for name, signal, _ in _FOLLOWED}
+    followed = {name: roll_pitch_yaw(record[signal.format("q")]) for name, signal, _ in _FOLLOWED}
     return [
         TimePlot(
             title=f"{angle.capitalize()} of gripper, hand and object in W",
@@ -89,7 +89,7 @@ def _curves(followed: dict[str, Floats], i: int) -> list[Curve]:
     return [Curve(label=name, values=followed[name][:, i], stroke=stroke) for name, _, stroke in _FOLLOWED]
 
 
-def _angles(q: Floats) -> Floats:
+def roll_pitch_yaw(q: Floats) -> Floats:
     """Return roll, pitch and yaw, °, without jumps by a whole turn."""
     yaw_pitch_roll = Rotation.from_quat(q, scalar_first=True).as_euler("ZYX")
     return np.degrees(np.unwrap(yaw_pitch_roll[:, ::-1], axis=0))

@@ -4,13 +4,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from handover.cosim.blocks.plain_rotation import vector
 from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.time_plot import Curve, Level, Phase, Stroke, TimeFigure, TimePlot, phases_of
+from handover.scenarios.free_flyer.handover.handover_plots import roll_pitch_yaw
 from handover.scenarios.free_flyer.parameters import ROBOTS, TeamParameters, TeamTask
 from handover.scenarios.free_flyer.push.push_plots import CAPTION, plot_thrust
 from handover.scenarios.free_flyer.scene import Solid, draw_scene, hand_at, jaw_gap, large_object_at, robot_at
@@ -104,8 +104,7 @@ def _positions(record: Record, hands: Sequence[str], phases: Sequence[Phase]) ->
 
 
 def _orientation(record: Record, phases: Sequence[Phase]) -> list[TimePlot]:
-    turns = Rotation.from_quat(record["person.q_WO"], scalar_first=True).as_euler("ZYX")[:, ::-1]
-    angles = np.degrees(np.unwrap(turns, axis=0))
+    angles = roll_pitch_yaw(record["person.q_WO"])
     curves = [Curve(label=name, values=angles[:, k]) for k, name in enumerate(("roll", "pitch", "yaw"))]
     return [TimePlot(title="Orientation of the object in W", quantity="angle", unit="°", curves=curves, phases=phases)]
 
