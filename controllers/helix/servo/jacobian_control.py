@@ -13,7 +13,7 @@ REACH_TOLERANCE = 0.003
 """Distance of the model's gripper from a goal, m, beyond which the goal is out of its reach."""
 
 STIFFENING = 100.0
-"""How much stiffer a state becomes that is at its limit, sec. 3.3.3."""
+"""How much stiffer a state becomes that is at its limit, sec. 3.3.3; algorithm 2, lines 11, 17 and 20."""
 
 _RANK_TOLERANCE = 1e-9
 _MAX_REACH_STEPS, _REACHED = 200, 0.001

@@ -8,7 +8,6 @@ import pytest
 import tomli
 
 import handover.scenarios.helix
-from handover.controllers.helix.servo.jacobian_control import STIFFENING
 from handover.controllers.helix.servo.servo_parameters import Params as ServoParams
 from handover.controllers.helix.vision.handover_vision import Params as VisionParams
 from handover.plants.helix.cameras.stereo_camera import Params as CameraParams
@@ -87,7 +86,6 @@ def test_cameras_are_where_the_units_have_them():
 def test_settings_of_experiments_are_the_defaults(paper: Paper):
     servo, task = ServoParams(), Task()
     assert servo.control_period == paper["experiment"]["control_period"]["value"]
-    assert servo.carry_after == paper["delivery"]["carry_after"]["value"]
     assert servo.threshold_drop == paper["delivery"]["threshold_drop"]["value"][Tuning.OWN]
     assert (task.radius, task.height) == tuple(paper["experiment"][n]["value"] for n in ("radius", "height"))
     assert Disturbances().box_height == paper["calibration"]["box_height"]["value"]
@@ -95,7 +93,6 @@ def test_settings_of_experiments_are_the_defaults(paper: Paper):
 
 def test_what_stands_elsewhere_in_the_code_is_the_published(paper: Paper):
     assert [e.name.lower().replace("_", "-") for e in HandPlace] == paper["experiment"]["places"]["value"]
-    assert paper["jacobian_control"]["stiffening"]["value"] == STIFFENING
     tremor = HandParams().tremor_rms
     assert ServoParams().ball_motion == pytest.approx(tremor / np.sqrt(3.0), abs=5e-5)
 
