@@ -1,4 +1,4 @@
-"""Parameters of the infrared reflex, and the calibration of its sensors. [Luberto] sec. IV and V, eq. (11)."""
+"""Parameters of the infrared reflex. [Luberto] sec. IV and V."""
 
 import enum
 import math
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handover.controllers.ir_grasp.sensor_geometry import LARGEST_CLOSURE
+from handover.controllers.ir_grasp.sensor_geometry import LARGEST_CLOSURE, Calibration
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.origins import NOT_GIVEN, assumed, derived, stated
 from handover.cosim.blocks.ports import Matrix3x4, Vector2, Vector3, Vector4, parameter
@@ -33,56 +33,6 @@ _TUNED = assumed("our own correction on the move; tuned on seeds below 1000")
 _TUNED_ALONG = assumed("our own correction on the move; tuned on seeds 9100 to 9399")
 
 _INPUTS = ("p_x", "p_y", "yaw", "sigma")
-
-_FULL_SCALE = 4095.0
-_HALVINGS = 60  # halvings of 4095 ticks: beyond the last bit of a float
-
-
-@dataclass(frozen=True)
-class Calibration:
-    """y = a e^(b x) + c e^(d x): distance y in m over ADC output x in ticks, from 0 to 4095; falls as x grows."""
-
-    a: float
-    b: float
-    c: float
-    d: float
-
-    def distance(self, ticks: float) -> float:
-        """Return the distance y, in m, that stands for an ADC output, by eq. (11)."""
-        return self.a * math.exp(self.b * ticks) + self.c * math.exp(self.d * ticks)
-
-    def slope(self, ticks: float) -> float:
-        """Return dy/dx, in m/tick."""
-        return self.a * self.b * math.exp(self.b * ticks) + self.c * self.d * math.exp(self.d * ticks)
-
-    def ticks(self, distance: float) -> float:
-        """Return the ADC output x, in ticks, that stands for a distance in m, by halving; 0 or 4095 beyond the curve.
-
-        A threshold in ticks is compared with readings directly, without the distance of each reading.
-        """
-        low, high = 0.0, _FULL_SCALE
-        for _ in range(_HALVINGS):
-            middle = (low + high) / 2.0
-            low, high = (middle, high) if self.distance(middle) > distance else (low, middle)
-        return (low + high) / 2.0
-
-    def faults(self) -> list[str]:
-        """Return what keeps the curve from falling, so that a reading would have no unique distance."""
-        faults = [f"{name} = {x:g} m must be above 0" for name, x in (("a", self.a), ("c", self.c)) if x <= 0.0]
-        falling = (("b", self.b), ("d", self.d))
-        return faults + [f"{name} = {x:g} 1/tick must be below 0" for name, x in falling if x >= 0.0]
-
-
-def flight_distance(speed: float, flight_time: float) -> float:
-    """Return the distance d = v t_f / 2, eq. (3), in m, of what returns a wave after a flight time.
-
-    The source's own sensors measure the returned intensity instead (sec. V-B), and so does the reflex.
-
-    Args:
-        speed: v of the wave, in m/s.
-        flight_time: t_f from emission to reception, in s.
-    """
-    return speed * flight_time / 2.0
 
 
 class InvalidReflexParameters(InvalidParameters):

@@ -1,15 +1,20 @@
-"""Where the hand's sensors are by its closure, and the Jacobian of their distances that follows before any is measured.
+"""Where the hand's sensors are by its closure, the Jacobian that follows from that, and what a reading stands for.
 
 In the hand's frame H: origin at the wrist, x ahead, y to the left. The values are of the hand's design (assumed, as
 the plant's), its fingers free: what they touch bends them otherwise.
 """
 
+import math
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
+
+_FULL_SCALE: Final = 4095.0
+_HALVINGS: Final = 60  # halvings of 4095 ticks: beyond the last bit of a float
 
 _STEP: Final = 0.1  # of the closure, from one row of the table to the next
 _TABLE: Final = np.array(
@@ -70,3 +75,38 @@ def surface_points(sigma: float, distances: Floats) -> Floats:
     """Return the points, (3, 2) in H, in m, that lie at distances (3,), in m, along the beams."""
     p, n, _ = sensor_poses(sigma)
     return p + distances[:, None] * n
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """y = a e^(b x) + c e^(d x): distance y in m over ADC output x in ticks, from 0 to 4095; falls as x grows."""
+
+    a: float
+    b: float
+    c: float
+    d: float
+
+    def distance(self, ticks: float) -> float:
+        """Return the distance y, in m, that stands for an ADC output, by eq. (11)."""
+        return self.a * math.exp(self.b * ticks) + self.c * math.exp(self.d * ticks)
+
+    def slope(self, ticks: float) -> float:
+        """Return dy/dx, in m/tick."""
+        return self.a * self.b * math.exp(self.b * ticks) + self.c * self.d * math.exp(self.d * ticks)
+
+    def ticks(self, distance: float) -> float:
+        """Return the ADC output x, in ticks, that stands for a distance in m, by halving; 0 or 4095 beyond the curve.
+
+        A threshold in ticks is compared with readings directly, without the distance of each reading.
+        """
+        low, high = 0.0, _FULL_SCALE
+        for _ in range(_HALVINGS):
+            middle = (low + high) / 2.0
+            low, high = (middle, high) if self.distance(middle) > distance else (low, middle)
+        return (low + high) / 2.0
+
+    def faults(self) -> list[str]:
+        """Return what keeps the curve from falling, so that a reading would have no unique distance."""
+        faults = [f"{name} = {x:g} m must be above 0" for name, x in (("a", self.a), ("c", self.c)) if x <= 0.0]
+        falling = (("b", self.b), ("d", self.d))
+        return faults + [f"{name} = {x:g} 1/tick must be below 0" for name, x in falling if x >= 0.0]

@@ -1,4 +1,4 @@
-"""The reflex's model of its hand against the hand of the scene, and equation (3)."""
+"""The reflex's model of its hand against the hand of the scene, and equation (11)."""
 
 import math
 
@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handover.controllers.ir_grasp.parameters import Calibration, Params, flight_distance
-from handover.controllers.ir_grasp.sensor_geometry import nominal_jacobian, sensor_poses, surface_points
+from handover.controllers.ir_grasp.parameters import Params
+from handover.controllers.ir_grasp.sensor_geometry import Calibration, nominal_jacobian, sensor_poses, surface_points
 from handover.cosim.blocks.ports import Floats
 from handover.plants.ir_grasp.actuation import PULLEYS, STIFFNESS, resting_posture
 from handover.plants.ir_grasp.hand import sensor_rays
@@ -55,11 +55,6 @@ def test_a_surface_point_lies_at_its_distance_along_the_beam():
 def test_the_free_hands_tension_is_that_of_the_tendons_law():
     compliance = float(np.sum(PULLEYS**2 / STIFFNESS)) + 1.0 / SCENE.tendon_stiffness
     assert Params().free_tension == pytest.approx(SCENE.tendon_travel / compliance, rel=1e-3)
-
-
-def test_equation_3_halves_the_way_of_the_wave():
-    light = 299_792_458.0
-    assert flight_distance(light, 2.0 * 0.06 / light) == pytest.approx(0.06)
 
 
 CURVE = Calibration(0.062, -0.0030, 0.022, -0.00043)
