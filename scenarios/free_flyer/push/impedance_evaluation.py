@@ -22,6 +22,7 @@ from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PlacedUnit
 from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
 from handover.scenarios.experiment.paper import paper_values
+from handover.scenarios.experiment.starts import array_of
 from handover.scenarios.free_flyer.model_mismatch import assumed_body, model_mismatch
 from handover.scenarios.free_flyer.parameters import Behaviour, Body, ImpedanceParameters
 from handover.scenarios.free_flyer.push.hand_push import HAND_SIGNALS, HandPush, hand_push_at
@@ -214,7 +215,8 @@ P = TypeVar("P", bound=ImpedanceParameters)
 class PushEvaluator(Evaluator, Generic[P]):
     """Follows one push and decides whether the gripper came back to rest, and moved as by a model of its impedance.
 
-    Subclasses say which `signals` make up a motion, and what an error is.
+    Subclasses say which `signals` make up a motion, and what an error is. The push ends when `start` and `duration` of
+    its unit say. Of a unit without them it ended with what it last gave.
     """
 
     records = (Metric,)
@@ -224,16 +226,19 @@ class PushEvaluator(Evaluator, Generic[P]):
         self.parameters = parameters
         self._rows: list[list[Any]] = []
         self._saturated = 0
-        self._t = 0.0
-        self._astray = 0.0
-        self._spins = False
+        self._timed, self._push_end = True, parameters.end
+        self._t, self._astray, self._spins = 0.0, 0.0, False
         self._greatest = [0.0, 0.0]
         self._last = (0.0, 0.0)
         self._stability: dict[str, Metric] = {}
         self._mismatch = ""
 
     def note_units(self, units: Mapping[str, PlacedUnit]) -> None:
-        """Keep what the controllers do not know of the robot."""
+        """Keep when the push ends, if its unit says so, and what the controllers do not know of the robot."""
+        of_push = units["push"].description.parameters if "push" in units else {}
+        self._timed = {"start", "duration"} <= of_push.keys()
+        ends = (float(array_of(units["push"], name)[0]) for name in ("start", "duration") if self._timed)
+        self._push_end = sum(ends) if self._timed else -math.inf
         self._mismatch = model_mismatch(units)
 
     def __call__(self, t: float, signals: Signals) -> None:
@@ -247,6 +252,8 @@ class PushEvaluator(Evaluator, Generic[P]):
         self._greatest = [max(both) for both in zip(self._greatest, self._last, strict=True)]
         if self._last[0] > REST_POSITION or self._last[1] > REST_ANGLE:
             self._astray = t
+        if not self._timed and any((*signals.plain("push.f_G"), *signals.plain("push.tau_G"))):
+            self._push_end = t
 
     @abc.abstractmethod
     def _away(self, signals: Signals) -> tuple[float, float]:
@@ -259,12 +266,12 @@ class PushEvaluator(Evaluator, Generic[P]):
 
     @property
     def _at_rest(self) -> bool:
-        return self._t - max(self._astray, self._end) >= RESTING
+        return self._t - max(self._astray, self._end) >= RESTING and self._end > -math.inf
 
     @property
     def _end(self) -> float:
-        """When the last push ended, s, be it by hand."""
-        return max(self.parameters.end, self.last_pushed)
+        """When the last push ended, s, be it by hand; minus infinity while there was none."""
+        return max(self._push_end, self.last_pushed)
 
     @property
     def _settled(self) -> float:
@@ -374,14 +381,17 @@ class ImpedanceEvaluator(PushEvaluator[ImpedanceParameters]):
 
     def _back(self) -> str:
         """Return whether the gripper came back to rest, as a clause of the reason."""
-        p = self.parameters
         if self._at_rest:
-            last = "the push" if self._end == p.end else "the last push, by hand"
+            last = "the push" if self._end == self._push_end else "the last push, by hand"
             return f"the gripper was back at rest, within {_BAND}, {self._settled:.1f} s after {last}"
         if self._spins:
             return f"the robot was out of control at {self._t:.1f} s, turning by more than {SPINNING:.0f} rad/s"
-        if self._t < float(p.stop) - 0.02:
+        if self._t < float(self.parameters.stop) - 0.02:
             return f"stopped at {self._t:.1f} s, before the robot could come to rest"
+        if self._end == -math.inf:
+            return f"nothing pushed the gripper in {self._t:.3g} s"
+        if not self._timed and self._t - self._end < RESTING:
+            return f"the gripper was pushed until {self._end:.1f} s, too late to see it rest within {self._t:.3g} s"
         return (
             f"the gripper did not come back to rest, within {_BAND} for {RESTING:g} s, in {self._t - self._end:.3g} s: "
             f"{1000 * self._last[0]:.0f} mm and {math.degrees(self._last[1]):.1f}° away at the end"

@@ -77,7 +77,7 @@ def figures_of_push(parameters: ImpedanceParameters, record: Record) -> list[Tim
         TimeFigure(
             name="errors",
             caption="Error of the gripper's pose, rest minus actual, in the whole run, and by [Fernandes2020] "
-            f"eq. (4.4); {_push_in_words(parameters)}.",
+            f"eq. (4.4); {_push_in_words(parameters, record)}.",
             plots=[
                 *errors_over_time("position", "mm", 1000 * errors.p, 1000 * errors.p_model, phases),
                 *errors_over_time("orientation", "°", turned, turned_model, phases),
@@ -100,16 +100,41 @@ def figures_of_push(parameters: ImpedanceParameters, record: Record) -> list[Tim
 
 def phases_of_push(p: ImpedanceParameters, record: Record) -> list[Phase]:
     """Return the time before, of and after the push; the push alone has a name, in plots and replay."""
-    end = float(record.time[-1])
-    begin, over = min(p.begin, end), min(p.end, end)
+    begin, over = _span(p, record)
     return [
         Phase(begin=0.0, end=begin, name=""),
         Phase(begin=begin, end=over, name="push" if p.kind is Wrench.FORCE else "twist"),
-        Phase(begin=over, end=end, name=""),
+        Phase(begin=over, end=float(record.time[-1]), name=""),
     ]
 
 
-def _push_in_words(p: ImpedanceParameters) -> str:
+def _span(p: ImpedanceParameters, record: Record) -> tuple[float, float]:
+    """Return when the push began and ended, s: as the parameters say, or where another one was given, as recorded."""
+    end = float(record.time[-1])
+    if _is_as_said(p, record):
+        return min(p.begin, end), min(p.end, end)
+    (acting,) = np.nonzero(_wrench(record).any(axis=1))
+    return (float(record.time[max(0, acting[0] - 1)]), float(record.time[acting[-1]])) if len(acting) else (end, end)
+
+
+def _wrench(record: Record) -> Floats:
+    """Return force and torque on the gripper, means over the step before each row, shape (rows, 6)."""
+    return np.hstack([record["push.f_G"], record["push.tau_G"]])
+
+
+def _is_as_said(p: ImpedanceParameters, record: Record) -> bool:
+    """Return whether the parameters' pulse acted: another unit, or values of the unit's own, may have given another."""
+    dt, said = np.diff(record.time), np.zeros(6)
+    said[p.axis + (0 if p.kind is Wrench.FORCE else 3)] = p.force if p.kind is Wrench.FORCE else p.torque
+    lasted = np.diff(np.clip(record.time, p.begin, p.end))
+    return np.allclose(_wrench(record)[1:] * dt[:, np.newaxis], np.outer(lasted, said), rtol=1e-6, atol=1e-9)
+
+
+def _push_in_words(p: ImpedanceParameters, record: Record) -> str:
+    if not _is_as_said(p, record):
+        force, torque = (float(np.linalg.norm(part, axis=1).max()) for part in np.split(_wrench(record), 2, axis=1))
+        begin, over = _span(p, record)
+        return f"pushed with up to {force:.3g} N and {torque:.3g} N·m between {begin:.3g} s and {over:.3g} s"
     what = f"pushed with {p.force:g} N along" if p.kind is Wrench.FORCE else f"twisted with {p.torque:g} N·m about"
     return f"{what} {p.axis.name.lower()} for {p.duration:g} s"
 

@@ -2,15 +2,19 @@
 
 import contextlib
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from support.scenarios.flyer_runs import fmu, kept, metric, run
+from support.scenarios.staged_signals import staged
 from support.wording import Wording
 
+from handover.controllers.free_flyer.ports import PERIOD
 from handover.cosim.exceptions import InitializationError
+from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System
 from handover.scenarios.execution.request import RunRequest
 from handover.scenarios.execution.runner import experiment_system
@@ -18,6 +22,8 @@ from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.free_flyer.model_mismatch import model_mismatch
 from handover.scenarios.free_flyer.parameters import ImpedanceParameters, Propulsion
 from handover.scenarios.free_flyer.push.impedance import FlyerImpedance
+from handover.scenarios.free_flyer.push.impedance_evaluation import ImpedanceEvaluator
+from handover.scenarios.free_flyer.push.push_plots import phases_of_push
 from handover.scenarios.free_flyer.robot_wiring import expected_lag
 
 
@@ -33,6 +39,40 @@ def test_a_pushed_robot_comes_back_and_moves_as_the_impedance_model_says():
     assert np.all(away[record.time > 1.5 + done.metric("settling_time") + 0.016] < 0.010)
     impulse = np.diff(record.time) @ record["push.f_G"][1:]
     assert impulse == pytest.approx([2.5, 0.0, 0.0])
+
+
+def system_of(folder: Path, *given: str) -> System:
+    """Return the system of a run with parameters as the command takes them."""
+    with contextlib.ExitStack() as opened:
+        task = RunRequest(subject="flyer_impedance", parameters=given, out=folder).task(opened)
+    return experiment_system(task.experiment, task.parameters, task.seed, task.fmus, task.unit_values, task.options)
+
+
+def rows_of_a_push(until: float) -> Iterator[tuple[float, Signals]]:
+    """Yield times and signals of a robot that is pushed from 8 s until a time, and back at its place a second later."""
+    still = {name: np.zeros(3) for name in ("v_WG", "w_WB")} | {"q_WB": np.array([1.0, 0.0, 0.0, 0.0])}
+    for t in np.arange(0.0, 20.0, float(PERIOD)).tolist():
+        away, force = 0.5 * (8.0 < t <= until + 1.0), 2.0 * (8.0 < t <= until)
+        robot = {**still, "p_WG": np.array([away, -0.07, 0.0])}
+        push = {"f_G": np.array([force, 0.0, 0.0]), "tau_G": np.zeros(3)}
+        yield t, staged({"robot": robot, "push": push, "thrusters": {"saturated": False}})
+
+
+@pytest.mark.parametrize("own_unit", [True, False])
+def test_rest_is_counted_from_the_end_of_the_push_that_acted_and_not_awaited_before_it(own_unit: bool, tmp_path: Path):
+    evaluator = ImpedanceEvaluator(ImpedanceParameters())
+    evaluator.note_units({} if own_unit else system_of(tmp_path, "push.start=8", "push.duration=2").units)
+    over = [t for t, seen in rows_of_a_push(10.0) if evaluator(t, seen) or evaluator.over]
+    assert over[0] == pytest.approx(16.0, abs=0.02)
+    settled = evaluator.outcome().metrics["settling_time"].value
+    assert settled == pytest.approx(1.0, abs=0.02)
+
+
+def test_another_push_than_the_parameters_say_is_marked_when_it_acted():
+    record = kept("flyer_impedance").record
+    for begin in (1.0, 3.0):  # the run's, and that of a unit that takes no notice of it
+        _, push, _ = phases_of_push(ImpedanceParameters(begin=begin), record)
+        assert (push.begin, push.end) == pytest.approx((1.0, 1.5), abs=0.0 if begin == 1.0 else 0.016)
 
 
 def test_the_compliant_robot_yields_more_than_twice_as_far(tmp_path: Path):
@@ -193,7 +233,4 @@ ASSUMED = "what its controllers assumed"
 def test_what_the_controllers_do_not_know_is_told_by_the_values_that_the_units_got(
     given: tuple[str, ...], told: str, tmp_path: Path
 ):
-    with contextlib.ExitStack() as opened:
-        task = RunRequest(subject="flyer_impedance", parameters=given, out=tmp_path).task(opened)
-    system = experiment_system(task.experiment, task.parameters, task.seed, task.fmus, task.unit_values, task.options)
-    assert model_mismatch(system.units) == (f"; {told}" if told else "")
+    assert model_mismatch(system_of(tmp_path, *given).units) == (f"; {told}" if told else "")
