@@ -127,7 +127,6 @@ class HandoverEvaluator(Evaluator):
         self._unseen = {"ball": 0.0, "ring": 0.0}  # time for which vision did not see them, s
         self._ever_seen = {"ball": False, "ring": False}
         self._tilt = 0.0
-        self._threshold_grasp = 0.0
         self._grasp_began: float | None = None  # the last time
         self._closing_distance = 0.0  # then
         self._released_at: float | None = None
@@ -141,7 +140,6 @@ class HandoverEvaluator(Evaluator):
         period = None if servo is None else servo.start.get("control_period")
         ticks_otherwise = servo is not None and servo.description.sampled and servo.description.step != period
         self._control_period = None if ticks_otherwise else period
-        self._threshold_grasp = 0.0 if servo is None else float(servo.start.get("threshold_grasp", 0.0))
 
     def __call__(self, t: float, signals: Signals) -> None:
         """Follow phases and positions."""
@@ -321,12 +319,10 @@ class HandoverEvaluator(Evaluator):
         if self._phase == "RECOVER" or unseen > 0.5 * self._t:
             return f"lost {lost}: of {patience:.0f} s it was not seen for {unseen:.0f} s"
         goal = "its goal" if self._gives_error else "the ball"
-        if nearest < self._threshold_grasp:
-            tilted = f", tilted by {np.degrees(self._tilt):.0f}° at the end" if self._tilt else ""
-            came = f"of late the gripper came within {nearest:.3f} m of {goal}"
-            return f"no grasp: {came}, but did not stay there{tilted}"
-        reach = "out of reach or too slow" if nearest > 2 * self.parameters.threshold else "no grasp"
-        return f"{reach}: after {patience:.0f} s the arm came no nearer than {nearest:.3f} m to {goal}"
+        tilted = f", tilted by {np.degrees(self._tilt):.0f}°" if self._tilt else ""
+        why = "out of reach or too slow" if nearest > 2 * self.parameters.threshold else "time ran out"
+        came = f"of late the gripper was {nearest:.3f} m from {goal} at the nearest"
+        return f"{why}: {came}, and {self._error:.3f} m after {patience:.0f} s{tilted}"
 
 
 def _mismatch_metrics(m: ModelMismatch) -> dict[str, Metric]:

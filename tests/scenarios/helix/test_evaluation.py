@@ -169,17 +169,17 @@ def test_a_controller_without_phases_is_judged_by_its_gripper(wording: Wording):
 
 
 def test_a_run_out_of_time_says_why_by_what_was_so_at_its_end(wording: Wording):
-    system = System()
-    system.add("servo", cached("VisualServo", 3), threshold_grasp=0.003)
     for error, seen in ((0.3, True), (0.02, True), (0.002, True), (0.02, False)):
         begin, end = signals(Phase.APPROACH, error=0.001), signals(Phase.DESCEND, sees_ball=seen, error=error)
         evaluator = HandoverEvaluator(Parameters())
         assert "final_distance" not in evaluator.outcome().metrics
-        evaluator.note_units(system.units)
         for t in range(61):
             evaluator(float(t), end if t or not seen else begin)
         assert evaluator.over
         wording.check(evaluator.outcome().reason)
+    converging = ((float(t), signals(Phase.DESCEND, error=0.001 if t == 35 else 0.04)) for t in range(41))
+    early = follow(*converging, parameters=Parameters(patience=40.0)).outcome().reason
+    assert all(told in early for told in ("time ran out", "0.001 m", "0.040 m", "40 s"))
     for until, sees_ball in ((0.3, True), (10.0, True), (10.0, False)):
         waiting = signals(Phase.WAIT, sees_ball=sees_ball)
         wording.check(follow((0.0, waiting), (until, waiting)).outcome().reason)
