@@ -287,6 +287,7 @@ class MetricTest:
 
     Attributes:
         paired: whether the runs have shared seeds, and the test is of these pairs.
+        runs: pairs, or runs done of the campaign that has fewer, whether they have a value or not.
     """
 
     key: Key
@@ -295,6 +296,7 @@ class MetricTest:
     metric: str
     test: DifferenceTest
     paired: bool
+    runs: int
     corrected: float = 1.0
 
     @property
@@ -318,6 +320,33 @@ def bounds_of_p(tests: Iterable[SuccessTest | MetricTest]) -> list[str]:
         more = f"{enough} pairs" if paired else "more runs"
         sentences.append(f"With {of} p cannot fall below {least:.3g}; with {more} it can be less than {LEVEL}.")
     return sentences
+
+
+def remarks_on_metrics(results: ComparedCampaigns) -> list[str]:
+    """Return what a difference of pairs is, if there are any, and which metrics are not tested and why."""
+    tests = {m: metric_tests(results, m) for m in results.shown_metrics}
+    remarks = [f"{m} is not tested{why}" for m, found in tests.items() if (why := _why_untested(results, m, found))]
+    if any(t.paired for found in tests.values() for t in found):
+        remarks.append(
+            "A difference of pairs is the median of their differences. It can have another sign than the difference of "
+            "the medians."
+        )
+    return remarks
+
+
+def _why_untested(results: ComparedCampaigns, metric: str, tests: Sequence[MetricTest]) -> str:
+    """Return where campaigns are not tested against each other, and which of them lack the metric; "" if nowhere."""
+    tested = {(t.key, t.first, t.second) for t in tests}
+    cases = [c for c in _pairs_of_campaigns(results)[:MAX_TESTS] if c[0] != EVERY or len(results.matched) == 1]
+    missing = [c for c in cases if c not in tested]
+    if not missing:
+        return ""
+    where = f" at {counted(len(missing), 'point')}" if tested else ""
+    lack = {n for key, *names in missing for n in names if not results.number_measured(results.at(key)[n], metric)}
+    who = " and ".join(e.name for e in results.entries if e.name in lack)
+    return (
+        f"{where}: {who} {'have' if len(lack) > 1 else 'has'} no value of it" if lack else f"{where}: no pair has both"
+    )
 
 
 def success_tests(results: ComparedCampaigns) -> list[SuccessTest]:
@@ -361,8 +390,10 @@ def _metric_tests(results: ComparedCampaigns, metric: str) -> list[MetricTest]:
             a, b = results.at(key)[first], results.at(key)[second]
             test = unpaired_difference(values[a.done], values[b.done])
         if test is not None:
-            paired = bool(rows)
-            tests.append(MetricTest(key=key, first=first, second=second, metric=metric, test=test, paired=paired))
+            runs = len(rows) or min(len(results.at(key)[name].done) for name in (first, second))
+            tests.append(
+                MetricTest(key=key, first=first, second=second, metric=metric, test=test, paired=bool(rows), runs=runs)
+            )
     corrected = holm([t.test.p for t in tests])
     return [replace(t, corrected=p) for t, p in zip(tests, corrected, strict=True)]
 

@@ -14,6 +14,7 @@ from handover.scenarios.comparison.campaigns import (
     ComparedCampaigns,
     bounds_of_p,
     metric_tests,
+    remarks_on_metrics,
     success_tests,
 )
 from handover.scenarios.comparison.entries import CampaignEntry, Difference, Entry, RunEntry
@@ -137,7 +138,7 @@ def tests_section(results: ComparedCampaigns) -> Section | None:
         "Holm's method."
     )
     of_metrics = [t for name in results.shown_metrics for t in metric_tests(results, name)]
-    note = " ".join([note, *bounds_of_p([*tests, *of_metrics])])
+    note = " ".join([note, *remarks_on_metrics(results), *bounds_of_p([*tests, *of_metrics])])
     if len(tests) > MAX_TESTS:
         note += f" Metrics are tested in the first {MAX_TESTS} of {len(tests)} cases only."
     html = Markup("").join(parts) + Markup("<p class='soft'>{}</p>").format(note)
@@ -155,7 +156,7 @@ def _metric_table(results: ComparedCampaigns, metric: str) -> Markup | None:
             results.label_of(t.key),
             t.first,
             t.second,
-            Cell(str(t.test.n), t.test.n),
+            Cell(f"{t.n} of {t.runs}", t.n),
             Cell(_signed(t.test.difference * unit.factor), t.test.difference),
             "–"
             if t.test.interval is None
@@ -166,7 +167,7 @@ def _metric_table(results: ComparedCampaigns, metric: str) -> Markup | None:
         for t in tests
     ]
     difference = unit.axis("second minus first")
-    header = ("at", "first", "second", "runs each", difference, "95 % interval", "test", "p", "p, Holm")
+    header = ("at", "first", "second", "with values", difference, "95 % interval", "test", "p", "p, Holm")
     caption = results.table.description(metric) or metric.replace("_", " ")
     heading = Markup("<h3>{}</h3>").format(caption[0].upper() + caption[1:])
     return heading + rows_table(header, rows, (3, 4, 5, 7, 8), sortable=True)

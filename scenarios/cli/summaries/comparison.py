@@ -14,6 +14,7 @@ from handover.scenarios.comparison.campaigns import (
     MetricTest,
     bounds_of_p,
     metric_tests,
+    remarks_on_metrics,
     success_tests,
 )
 from handover.scenarios.comparison.page import Comparison, RunComparison
@@ -75,15 +76,15 @@ def _print_tests(console: Console, results: ComparedCampaigns) -> None:
             results.label_of(t.key),
             t.metric,
             f"{t.second} – {t.first}",
-            str(t.n),
+            f"{t.n} of {t.runs}",
             _difference(results, t),
             t.test.method,
             f"{t.test.p:.3g}",
         ]
         for t in of_metrics
     ]
-    _print_table(console, ("at", "metric", "difference of", "runs each", "median", "test", "p"), metrics)
-    for sentence in bounds_of_p([*by_success, *of_metrics]):
+    _print_table(console, ("at", "metric", "difference of", "with values", "median", "test", "p"), metrics)
+    for sentence in [*remarks_on_metrics(results), *bounds_of_p([*by_success, *of_metrics])]:
         console.print(sentence, markup=False, soft_wrap=True)
 
 

@@ -117,6 +117,6 @@ def test_metrics_are_tested_always_and_successes_where_any_differ(here: Path, su
     done = compare("a", "b", "--metric", "moved")
     assert done.exit_code == 0, done.output
     lines = [line.split() for line in done.stdout.splitlines()]
-    assert ["all", "runs", "moved", "b", "–", "a", "5", "+30", "mm", "Wilcoxon", "0.0625"] in lines
+    assert ["all", "runs", "moved", "b", "–", "a", "5", "of", "5", "+30", "mm", "Wilcoxon", "0.0625"] in lines
     assert ("McNemar" in done.stdout) == (succeeded == 3)  # otherwise its p is 1
     assert "With 5 pairs p cannot fall below 0.0625" in done.stdout

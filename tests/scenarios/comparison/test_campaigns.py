@@ -15,6 +15,7 @@ from handover.scenarios.comparison.campaigns import (
     SuccessTest,
     bounds_of_p,
     metric_tests,
+    remarks_on_metrics,
     success_tests,
 )
 from handover.scenarios.comparison.entries import NotComparable, differences_of, read_entries
@@ -80,6 +81,18 @@ def test_runs_with_one_seed_are_pairs(tmp_path: Path):
     assert 0.002 <= moved.test.interval.low < 0.0045 < moved.test.interval.high <= 0.007
 
 
+def test_a_pair_without_both_values_is_left_out_and_counted(tmp_path: Path):
+    first = campaign(tmp_path / "a", [{}], moved=[0.01, 0.02, 0.03, float("nan"), 0.05, 0.06])
+    results = compared(first, campaign(tmp_path / "b", [{}]))
+    (moved,) = metric_tests(results, "moved")
+    assert (moved.n, moved.runs, len(remarks_on_metrics(results))) == (5, 6, 1)
+    none_together = compared(
+        campaign(tmp_path / "c", [{}], 2, moved=[0.01, float("nan")]),
+        campaign(tmp_path / "d", [{}], 2, moved=[float("nan"), 0.01]),
+    )
+    assert ["no pair" in remark for remark in remarks_on_metrics(none_together)] == [True]
+
+
 def test_points_with_pairs_are_tested_together_too(tmp_path: Path):
     first = campaign(tmp_path / "a", THINGS, repetitions=3, success=[True] * 6, moved=[0.01] * 3 + [0.02] * 3)
     second = campaign(tmp_path / "b", THINGS, repetitions=3, success=[False] * 6, moved=[0.02] * 3 + [0.04] * 3)
@@ -136,6 +149,8 @@ def test_a_metric_that_one_lacks_is_shown_where_it_is(tmp_path: Path):
     second = campaign(tmp_path / "b", [{}], metrics={"moved": [0.02] * 6, "pushed": [0.5] * 6})
     results = compared(first, second, metrics=["moved", "pushed"])
     assert metric_tests(results, "pushed") == []
+    untested, _ = remarks_on_metrics(results)
+    assert all(told in untested for told in ("pushed", ": a has no value"))
     (point,) = campaigns_data(results, ())["points"]
     assert point["campaigns"]["a"]["metrics"]["pushed"] == {"median": None, "runs": 0, "interval": None}
     assert point["campaigns"]["b"]["metrics"]["pushed"]["median"] == 0.5
