@@ -33,7 +33,10 @@ def explain_import(error: BaseException) -> str:
     module = error.name.partition(".")[0] if isinstance(error, ModuleNotFoundError) and error.name else ""
     if module and module != package:
         needs = f"{package} needs the module {module}" if package else f"the module {module} is needed"
-        return f"{needs}, which this Python does not have ({sys.executable or sys.prefix}). Cure: {_install(module)}"
+        here = f"which this Python does not have ({sys.executable or sys.prefix})"
+        unknown = " Cure: install what brings it" if package else " Is it spelt so, or not installed?"
+        cure = _install(module)
+        return f"{needs}, {here}." + (f" Cure: {cure}" if cure else unknown)
     cause = [str(e) for e in _chain(error) if isinstance(e, ImportError)] or messages
     reason = next((line.strip() for line in cause[-1].splitlines() if line.strip()), type(error).__name__)
     what = package or module
@@ -69,14 +72,18 @@ def install_extra(extra: str) -> str:
 
 
 def _install(module: str) -> str:
-    """Return how to install what brings a module that is missing."""
-    distribution = _distribution(module)
-    extra = next((extra for name, extra in _requirements() if name == distribution), "")
-    return install_extra(extra) if extra else f"python -m pip install {distribution}"
+    """Return how to install what brings a missing module; "" of one that this project does not require.
+
+    Under a misspelled name there may be anything.
+    """
+    distribution, extras = _distribution(module), dict(reversed(_requirements()))
+    if extra := extras.get(distribution):
+        return install_extra(extra)
+    return f"python -m pip install {distribution}" if distribution in extras or module in _DISTRIBUTIONS else ""
 
 
 def _requirements() -> list[tuple[str, str]]:
-    """Return distributions that this project's extras bring, each with the name of its extra."""
+    """Return distributions that this project requires, each with the name of the extra that brings it, or with ""."""
     from importlib import metadata  # slow to load, here and below: the catalog imports this module
 
     try:
@@ -84,7 +91,7 @@ def _requirements() -> list[tuple[str, str]]:
     except metadata.PackageNotFoundError:  # in an environment that only runs its FMUs
         return []
     parts = [(_REQUIRED.match(requirement), _EXTRA.search(requirement)) for requirement in wanted]
-    return [(name[0], extra[1]) for name, extra in parts if name and extra]
+    return [(name[0], extra[1] if extra else "") for name, extra in parts if name]
 
 
 def _distribution(module: str) -> str:

@@ -61,6 +61,13 @@ def test_the_builder_tells_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, c
     assert text.count("Cure: ") == 1
 
 
+@pytest.mark.parametrize(("module", "command"), [("nunpy", False), ("pyarrow", True)])
+def test_nothing_is_to_be_installed_that_may_be_misspelled(module: str, command: bool):
+    told = explain_import(ModuleNotFoundError(f"No module named {module!r}", name=module))
+    assert module in told
+    assert ("pip install" in told) is command
+
+
 def test_an_fmu_tells_it(workshop: Workshop, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     host = workshop.own("scalars:Scalars", 3)
     code, told = FAILURES["missing_library"]
