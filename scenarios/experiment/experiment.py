@@ -269,7 +269,8 @@ class Experiment(abc.ABC, Generic[AnyEvaluator]):
         """
         system = self.build(parameters, seed, fmu)
         presume_steps_of_places(system, self.units)
-        fit_places(system, self.places, self.units)
+        path = f"{type(self).__module__}:{type(self).__qualname__}"
+        fit_places(system, self.places, self.units, self.name if path.startswith("handover.") else path)
         return system
 
     def check_unit_values(self, system: System, given: Sequence[str]) -> None:

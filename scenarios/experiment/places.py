@@ -67,7 +67,7 @@ def _sentence(description: str, more: str) -> str:
     return "; ".join(text for text in (description, *(c for c in more.split("; ") if c not in known)) if text)
 
 
-def fit_places(system: System, places: Mapping[str, Place], units: Mapping[str, str]) -> None:
+def fit_places(system: System, places: Mapping[str, Place], units: Mapping[str, str], scenario: str) -> None:
     """Leave out of a system what the units in its places do not have and need not have; what they must have is a fault.
 
     The scenario's own units have all of it. What is left out of another one is noted in `System.notes`, and
@@ -78,13 +78,14 @@ def fit_places(system: System, places: Mapping[str, Place], units: Mapping[str, 
         system: as the scenario wires it.
         places: what each place needs, by the unit's name in the system.
         units: the scenario's own unit in each place, by its name in the catalog or its block's path.
+        scenario: its name, or its class's path.
     """
     _prefer_own_outputs(system, {name: units[name] for name in places if name in system.units})
     for name, place in places.items():
         if name in system.units:
             own, placed = find_unit(units[name]), system.units[name]
             if placed.description.name != own.name or any(_missing(placed.description, place)):
-                _Fitting(system, placed, place, own).fit()
+                _Fitting(system, placed, place, own, f"handover list {scenario} --unit {name}").fit()
 
 
 def presume_steps_of_places(system: System, units: Mapping[str, str]) -> None:
@@ -128,7 +129,8 @@ def _ports(unit: FmuDescription) -> dict[Causality, Mapping[str, FmuPort]]:
 class _Fitting:
     """One unit in a place."""
 
-    def __init__(self, system: System, unit: PlacedUnit, place: Place, own: Entry) -> None:
+    def __init__(self, system: System, unit: PlacedUnit, place: Place, own: Entry, listed_by: str) -> None:
+        self._listed_by = listed_by
         self._system, self._unit, self._own = system, unit, own
         self._ports = ports_of_place(place, own)
         self._what = f"unit {unit.name} ({unit.description.name})"
@@ -175,7 +177,9 @@ class _Fitting:
 
     def _note(self, absent: Mapping[Causality, Sequence[str]]) -> None:
         """Note what is left out, and which of the unit's inputs nothing feeds: their names may be misspelled."""
-        if parts := [_without(causality, names, self._own.name) for causality, names in absent.items() if names]:
+        if parts := [
+            _without(causality, names, self._own.name, self._listed_by) for causality, names in absent.items() if names
+        ]:
             self._system.notes.append(f"{self._what} has {'; '.join(parts)}")
         fed = {*self._system.fed_inputs(self._unit.name), *self._unit.start}
         missing = [n for names in absent.values() for n in names]
@@ -193,7 +197,7 @@ def signature(v: Variable) -> str:
     return f"{v.kind.value}{shape}{unit}"
 
 
-def _without(causality: Causality, names: Sequence[str], own: str) -> str:
+def _without(causality: Causality, names: Sequence[str], own: str, listed_by: str) -> str:
     """Return which ports a unit does not have, and what the scenario does without them."""
     many = len(names) > 1
     what = {
@@ -203,7 +207,7 @@ def _without(causality: Causality, names: Sequence[str], own: str) -> str:
     }
     named = ", ".join(names)
     if len(names) > _MOST_NAMED:
-        named = f"of {own}'s {len(names)}, which `handover list {own}` shows"
+        named = f"of {own}'s {len(names)}, which `{listed_by}` shows"
     return f"no {causality.value}{'s' if many else ''} {named}: {what[causality]}"
 
 

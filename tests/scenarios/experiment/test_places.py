@@ -80,7 +80,8 @@ def test_a_note_names_a_few_ports_that_a_unit_lacks_and_counts_many():
     absent = {c: [p.declared.name for p in ports if p.declared.causality is c and not p.is_required] for c in Causality}
     assert f"no outputs {', '.join(absent[Causality.OUTPUT])}: " in note
     many = len(absent[Causality.PARAMETER])
-    assert f"no parameters of ArmImpedanceController's {many}, which `handover list ArmImpedanceController` " in note
+    listed = "handover list flyer_arm_impedance --unit impedance"
+    assert f"no parameters of ArmImpedanceController's {many}, which `{listed}` " in note
 
 
 def test_no_box_covers_another_in_the_graph_of_a_scenario(systems: Systems):
