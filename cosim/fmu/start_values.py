@@ -129,4 +129,5 @@ def parsed_number(port: FmuPort, text: str) -> int | float:
     try:
         return int(text) if port.kind is Kind.INTEGER else float(text)
     except ValueError:
-        raise ValueError(f"expected a {'whole ' if port.kind is Kind.INTEGER else ''}number") from None
+        between = ", with commas between the entries of an array" if port.shape and len(text.split()) > 1 else ""
+        raise ValueError(f"expected a {'whole ' if port.kind is Kind.INTEGER else ''}number{between}") from None

@@ -154,6 +154,9 @@ def select_fmus(
         if other and re.fullmatch(r"\w+", other) and other not in UNITS and not Path(other).exists():
             own = "; a file ends in .fmu, and a block of your own is named MODULE:CLASS"
             raise UsageError(f"unit {name}: no unit {other!r}: {nearest(other, UNITS)}{own}")
+        if re.fullmatch(r"[a-z_][\w.]*\.[A-Z]\w*[a-z]\w*", other) and not Path(other).exists():
+            meant = ":".join(other.rsplit(".", 1))
+            raise UsageError(f"unit {name}: there is no file {other}; a block is named MODULE:CLASS: {meant}")
         if other and not _BLOCK.fullmatch(other) and (other not in UNITS or Path(other).exists()):
             fmus[name] = Path(other)
             continue

@@ -154,6 +154,8 @@ def parse_value(variable: Variable, text: str) -> tuple[Any, str | None]:
         fault += f", {valid_range}"
     if fault and variable.shape and given not in (0, variable.size):
         fault += f": it takes {variable.size} numbers, {counted(given, 'is', 'are')} given"
+    if fault and variable.shape and len(text.split()) > 1:
+        fault += "; commas stand between the numbers"
     if fault and variable.items and (hint := suggestion(text, [n.lower() for n, _ in variable.items])):
         fault += f"; {hint}"
     return value, fault

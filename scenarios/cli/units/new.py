@@ -52,7 +52,9 @@ def new(kind: str, name: str, out: Path, place: str | None) -> None:
         files = _files(kind, class_name, module) if place is None else start_for(place, class_name, module)
         check_place(out)
         if there := [file for file in files if (out / file).exists()]:
-            raise UsageError(f"{out}: {', '.join(there)} {'is' if len(there) == 1 else 'are'} there already")
+            raise UsageError(
+                f"{', '.join(str(out / f) for f in there)} {'is' if len(there) == 1 else 'are'} there already"
+            )
         _check_hides_nothing(files)
         try:
             for file, text in files.items():

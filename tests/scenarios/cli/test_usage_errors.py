@@ -39,6 +39,8 @@ report ran --out ran/run.json
 run helix_hand
 run helix_handover -p alfa=0.2
 run helix_handover -p alpha=7
+run helix_handover --unit servo=dls.DampedLeastSquares
+run ir_grasp -p "scene.p_WO_0=0.01 0.02"
 run helix_handover -p ball_mass=1
 run helix_handover --seed -1
 run ir_grasp -p run_up=0 -p standoff=0 -p perturbed=false -p thing=paper_box_a

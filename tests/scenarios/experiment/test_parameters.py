@@ -44,6 +44,7 @@ def test_values_are_parsed_by_their_declared_kind_and_what_is_not_given_has_its_
         (RobotToHuman, ["stuck_nozzle=13"]),
         (RobotToHuman, ["stuck_nozzle=1.5"]),
         (IrGrasp, ["shift=0.1"]),
+        (IrGrasp, ["shift=0.1 0.2"]),
     ],
 )
 def test_bad_parameters_are_refused_with_valid_values(scenario: type[Any], given: list[str], wording: Wording):
