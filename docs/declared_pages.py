@@ -11,14 +11,17 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, get_args, get_origin
 
 import click
 import jinja2
 from equations import with_latex
 from gallery import GalleryExperiment, GalleryRun, metrics_of
+from typing_extensions import TypeAliasType
 from undocumented import Undocumented, commands, undocumented, undocumented_metrics
 
+from handover.cosim.blocks import ports as port_declarations
+from handover.cosim.blocks import units as unit_declarations
 from handover.cosim.blocks.description import Description, describe
 from handover.cosim.blocks.variable import Variable
 from handover.fmus.catalog import UNITS, Entry, import_class
@@ -56,6 +59,7 @@ def write(folder: Path, runs: Mapping[str, GalleryRun], experiments: Mapping[str
         "reference/units/index": ("units", {"robots": robots}),
         "reference/scenarios/index": ("scenarios", shown),
         "reference/experiments/index": ("experiments", shown),
+        "reference/port_types": ("port_types", port_types()),
         "reference/run_folder": ("run_folder", {"statuses": statuses(), "variables": environment_variables()}),
     }
     for entry in UNITS.values():
@@ -137,6 +141,20 @@ def environment_variables() -> dict[str, str]:
     """Return the environment variables and what they do, as the commands' help has them."""
     paragraphs = [_paragraph(command, "Environment") for _, command in commands()]
     return {name: " ".join(text.split()) for p in reversed(paragraphs) for name, text in _VARIABLE.findall(p)}
+
+
+def port_types() -> dict[str, Any]:
+    """Return the types by which blocks declare their ports: symbols by unit, shapes by array, and integers."""
+    of_units = {n: t.__metadata__[0] for n, t in vars(unit_declarations).items() if get_origin(t) is Annotated}
+    aliases = {n: get_args(t.__value__) for n, t in vars(port_declarations).items() if isinstance(t, TypeAliasType)}
+    shapes = {n: more.extents for n, (_, more) in aliases.items() if isinstance(more, port_declarations.Shape)}
+    return {
+        "units": {n: unit.symbol for n, unit in of_units.items()},
+        "arrays": {n: " × ".join(map(str, extents)) for n, extents in shapes.items()},
+        "integers": [
+            n for n, t in vars(port_declarations).items() if get_origin(t) is Annotated and get_args(t)[0] is int
+        ],
+    }
 
 
 def cell(text: object) -> str:

@@ -25,6 +25,7 @@ from handover.cosim.stepping.options import Algorithm
 from handover.fmus import interpreter
 from handover.fmus.compile import TARGETS
 from handover.scenarios.cli.command import main
+from handover.scenarios.results.tables import format_metric
 
 COMMANDS = [line for text in blocks(TEXT) for line in text.splitlines() if line.startswith(".venv/")]
 RUNS = [c for c in COMMANDS if " run " in c and "--live" not in c]
@@ -236,6 +237,24 @@ def test_the_runs_succeed(command: str):
     summary = json.loads((kept_run(*arguments_of(command), *begins) / "summary.json").read_text())
     assert summary["complete"]
     assert summary["success"] is not bool(begins), summary["reason"]
+
+
+@pytest.mark.slow
+def test_the_first_run_prints_what_the_readme_shows_of_it():
+    (shown,) = blocks(TEXTS["README"], "text")
+    verdict, *rows, _ = shown.splitlines()
+    summary = json.loads((kept_run("run", "helix_handover") / "summary.json").read_text())
+    assert verdict == f"helix_handover succeeded: {summary['reason']}"
+    printed = {m["description"]: format_metric(m) for m in summary["metrics"].values()}
+    of_readme = [re.split(r"\s{2,}", row.strip()) for row in rows]
+    assert of_readme == [[what, printed[what]] for what, _ in of_readme]
+
+
+def test_nothing_is_installed_from_an_index_on_which_it_is_not():
+    assert "not on an index yet" in TEXT
+    pages = [*PAGES, *(ROOT / "docs" / "tutorials").glob("*.md")]
+    named = r"pip install [^`\n]*handover-cosim"
+    assert [page.name for page in pages if re.search(named, page.read_text(encoding="utf-8"))] == []
 
 
 @pytest.mark.slow

@@ -301,3 +301,10 @@ def test_the_build_stops_at_a_link_or_a_cell_that_fails(text: str, code: str, na
     done = subprocess.run(call, capture_output=True, text=True, check=False)
     assert (done.returncode != 0) == bool(named), done.stderr
     assert [name for name in named if name not in done.stderr] == [], done.stderr
+
+
+def test_types_of_ports_are_those_that_are_declared():
+    types = maker("declared_pages").port_types()
+    assert (types["units"]["NewtonMetre"], types["arrays"]["Matrix3x4"]) == ("N.m", "3 × 4")
+    assert "UInt16" in types["integers"]
+    assert "Single" not in types["arrays"]

@@ -103,7 +103,7 @@ def vsl_train(context: click.Context, **given: Any) -> None:
     of points that were set aside. The model is a parameter of HybridKinematics: `-p model=FILE` of vsl_hybrid, with
     -p learned and -p friction_compensation as it was trained.
 
-    The published network is trained by PyTorch: `pip install "handover-cosim[train]"`.
+    The published network is trained by PyTorch, of the extra `train`.
 
     Ctrl-C aborts; each file is written at the end, whole or not at all.
     """
