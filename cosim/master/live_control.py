@@ -34,7 +34,7 @@ class LiveControl:
         pace: simulated seconds per second of wall time, positive; infinite: as fast as it goes. Another one raises
             ValueError: a run that is to wait is paused.
         paused: whether the run waits at the communication point that it has reached.
-        steps_asked: to how many points it was asked to go on nonetheless, in all.
+        steps_asked: single steps requested while paused, in all.
         stop: whether it is to end after its step.
 
     Attributes, written by the run:

@@ -66,6 +66,10 @@ def read_parquet(path: Path) -> Any:
             return pa.Table.from_batches(batches, schema)
     except (pa.ArrowException, UnicodeError, OverflowError) as e:
         raise InvalidRecord(path, one_line(e)) from e
+    except OSError as e:
+        if e.errno is not None:
+            raise
+        raise InvalidRecord(path, one_line(e)) from e  # Arrow's, of a checksum or of what is compressed
 
 
 def _is_number(kind: Any) -> bool:

@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass, field, fields
 from fractions import Fraction
 from importlib import import_module
 from numbers import Rational, Real
-from typing import TYPE_CHECKING, Any, ClassVar, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from handover.cosim.exceptions import InvalidOptions
 
@@ -170,15 +170,6 @@ class MasterOptions:
     isolated: tuple[str, ...] = ()
     unit_tolerances: Mapping[str, float] = field(default_factory=dict[str, float])
 
-    given: ClassVar[frozenset[str]]
-    """Names of those that were given, also at their defaults: arguments beside them may not say otherwise."""
-
-    def __new__(cls, **given: Any) -> "MasterOptions":
-        """Note what is given."""
-        made = super().__new__(cls)
-        object.__setattr__(made, "given", frozenset(given))
-        return made
-
     def __post_init__(self) -> None:
         given: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(self)}
         checks = {
@@ -222,8 +213,6 @@ class MasterOptions:
         """Order of the error of a run in the step: see `Extrapolation`."""
         return 2 if self.extrapolation is Extrapolation.LINEAR else 1
 
-
-vars(MasterOptions.__new__)["__wrapped__"] = MasterOptions.__init__  # whose arguments `help` shows
 
 OPTION_RECORDS = (MasterOptions, AdaptiveStep, Algorithm, Extrapolation)
 """Types of which options are made, for `pack_state` and `unpack_state`."""

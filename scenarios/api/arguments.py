@@ -318,6 +318,8 @@ def master_options(
 ) -> MasterOptions:
     """Return the master's options: the given ones or the command's defaults, with algorithm and isolation set.
 
+    An argument takes the place of an option that is at its default.
+
     Raises:
         InvalidInput: there is no such algorithm, one is of another type, or options say otherwise than an argument.
         InvalidOptions: see `MasterOptions`.
@@ -335,6 +337,6 @@ def master_options(
         **({"isolated": names} if names and set(names) != set(chosen.isolated) else {}),
     }
     for name, value in given.items():
-        if name in chosen.given and getattr(chosen, name) != value:
+        if getattr(chosen, name) not in (getattr(MasterOptions(), name), value):
             raise InvalidInput(f"{name!r} is given in options, too, and otherwise; give one of them")
     return replace(chosen, **given)

@@ -131,7 +131,7 @@ async def _serve(session: "Session") -> None:
         say(f"play: http://{HOST}:{listening.getsockname()[1]}/  (Ctrl-C ends the session)")
         await serve(page, page.work(), listening)
     runs = counted(page.runs, "run")
-    say(f"{runs} in {session.folder}" if any(session.folder.glob("*")) else "no run was begun")
+    say(f"{runs} in {session.folder}" if page.runs else "no run was begun")
 
 
 def _end_by_signals(page: "PlayPage") -> None:

@@ -234,7 +234,7 @@ class Experiment(abc.ABC, Generic[AnyEvaluator]):
     """Whether it draws random numbers, which follow from the seed."""
     parallel_step: ClassVar[Fraction | None] = None
     """Communication step, s, of all units where they step in parallel (Jacobi): each then hands on its results a step
-    late, with which the loop must be stable. None: it is with the steps that the units propose. One that follows from
+    late, with which the loop must be stable. None: stable with the steps that the units propose. One that follows from
     parameters: `step_in_parallel`."""
 
     def __init_subclass__(cls, **given: Any) -> None:

@@ -1,4 +1,4 @@
-"""The live page as HTML, and what it gets of a run that begins."""
+"""The live page as HTML, and the message at a run's beginning."""
 
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -23,7 +23,7 @@ def figure_json(plot: TimePlot, time: Floats) -> str:
 
 
 def begun_content(shown: ShownRun) -> dict[str, Any]:
-    """Return what a page gets when a run begins."""
+    """Return the message at a run's beginning."""
     scene = shown.scene
     assert scene is not None
     surroundings = {name: str(html) for name, html in scene.surroundings().items()}

@@ -97,7 +97,7 @@ def live_page(
     webcam: Path | None = None,
     scenario: str = "",
 ) -> Generator[tuple[str, LiveControl, PageInputs], None, None]:
-    """Serve the page of a run that will write a folder; at the end, wait until pages have got the run's end.
+    """Serve the page of a run that will write a folder; at the end, wait until its end has been sent to the pages.
 
     Args:
         folder: the run's.

@@ -86,7 +86,7 @@ def watch(folder: Path, controls: Path, listening: socket.socket, webcam: Path |
     """Serve the page of a run's folder; returns when the run has ended.
 
     Where the run's process ends without a verdict, as when it is killed, the standard input, a pipe from it, is closed:
-    pages get that, and the folder of the controls, which that process would have removed, is removed.
+    pages are notified, and the folder of the controls, which that process would have removed, is removed.
 
     Args:
         folder: the run's.

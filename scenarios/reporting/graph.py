@@ -11,6 +11,7 @@ import plotly.graph_objects as go
 from markupsafe import Markup, escape
 
 from handover.cosim.blocks.ports import Floats
+from handover.cosim.exceptions import counted
 from handover.cosim.system.conversion import LinearTransformation
 from handover.cosim.system.graph import Pair, bent, places
 from handover.fmus.contents.icons import catalog_icon
@@ -61,7 +62,8 @@ def graph_section(run: Mapping[str, Any]) -> Section | None:
         units=[(u["name"], u["model"], u["fmi"], rate(u)) for u in units],
         rows=_rows(connections[:_MAX_ROWS], run.get("conversions", ())),
         left_out=max(0, len(connections) - _MAX_ROWS),
-        connections=len(connections),
+        n_units=counted(len(units), "unit"),
+        n_connections=counted(len(connections), "connection"),
     )
     return Section(anchor="graph", title="Units and signals", html=Markup(html))
 

@@ -1,7 +1,6 @@
 """The command `handover study serve`: carries out a study on this computer, in a browser."""
 
 import asyncio
-import contextlib
 import sys
 from pathlib import Path
 
@@ -100,21 +99,20 @@ def serve(
         except InvalidWebcamFiles as e:
             raise UsageError(f"--webcam: {e}") from e
         try:
-            with contextlib.suppress(KeyboardInterrupt):
-                asyncio.run(
-                    serve_study(
-                        plan,
-                        out,
-                        host=host,
-                        port=port,
-                        number=participant,
-                        pace=pace or 1.0,
-                        pilot=pilot,
-                        webcam=webcam,
-                        photodiode=photodiode,
-                        tell=say,
-                    )
+            asyncio.run(
+                serve_study(
+                    plan,
+                    out,
+                    host=host,
+                    port=port,
+                    number=participant,
+                    pace=pace or 1.0,
+                    pilot=pilot,
+                    webcam=webcam,
+                    photodiode=photodiode,
+                    tell=say,
                 )
+            )
         except NotServed as e:
             raise UsageError(str(e)) from e
         except PilotsBrokenOff as e:

@@ -196,7 +196,7 @@ def _no_worse(sentence: str, printed: str, held: Sequence[float], started: Seque
 
 def _worth(runs: LimitRuns) -> Claim:
     says = Statement(
-        f"On at least {_MIN_AXES} axes the reflex holds {100 * WORTH:g} points more, in per cent of the objects, than "
+        f"On at least {_MIN_AXES} axes the reflex grasps {100 * WORTH:g} percentage points more of the objects than "
         f"the best way that does not look{_unpushed(runs)}."
     )
     compared = runs.compared(REFLEX, _WITHOUT)

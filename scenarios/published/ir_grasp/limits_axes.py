@@ -109,7 +109,7 @@ class Axis:
 
     def format_level(self, level: float) -> str:
         """Return a level with its unit."""
-        return f"{self.format_number(level)}{' ' * (self.unit not in ('', '°'))}{self.unit}"
+        return f"{self.format_number(level)}{'' if self.unit in ('', '°') else ' '}{self.unit}"
 
     def format_number(self, level: float) -> str:
         """Return a level, to be followed by its unit."""

@@ -144,13 +144,10 @@ class SessionFolder:
         """Return what is known of a round, None if it has not been played to its end.
 
         Raises:
-            InvalidRunFolder: its file is damaged, or has ratings that the plan does not allow.
+            InvalidRunFolder: its file is damaged.
         """
         file = self._file(number)
-        kept = read_file(file, f"it has no {file.name}", _KeptRound) if file.is_file() else None
-        if kept is not None and kept.answers is not None:
-            _check_kept(file, self._rating_faults(kept.answers))
-        return kept
+        return read_file(file, f"it has no {file.name}", _KeptRound) if file.is_file() else None
 
     @property
     def records(self) -> dict[int, RoundRecord]:
@@ -174,9 +171,18 @@ class SessionFolder:
         file = self.path / "questionnaire.json"
         if not file.exists():
             return None
-        answers = read_file(file, "it has no questionnaire.json", dict[str, str])
-        _check_kept(file, self._answer_faults(answers))
-        return answers
+        return read_file(file, "it has no questionnaire.json", dict[str, str])
+
+    def check(self) -> None:
+        """Compare what is kept with the plan.
+
+        Raises:
+            InvalidRunFolder: a file is damaged, or has ratings or answers that the plan does not allow; all are named.
+        """
+        found = {f"rounds/{n:02d}.json": self._rating_faults(given) for n, given in self.answers.items()}
+        found["questionnaire.json"] = self._answer_faults(self.questionnaire or {})
+        if faults := [f"{file}: {fault}" for file, of in found.items() for fault in of]:
+            raise InvalidRunFolder(self.path, f"it does not fit the plan: {'; '.join(faults)}")
 
     @property
     def next_round(self) -> Round | None:
@@ -383,11 +389,6 @@ class SessionFolder:
     def _is_late(self, record: RoundRecord) -> bool | None:
         p95 = record.latency_p95_ms
         return None if p95 is None else p95 > self.plan.latency_limit
-
-
-def _check_kept(file: Path, faults: Sequence[str]) -> None:
-    if faults:
-        raise InvalidRunFolder(file.parent, f"its {file.name} does not fit the plan: {'; '.join(faults)}")
 
 
 def pseudonym_of(number: int) -> str:

@@ -119,7 +119,8 @@ class StudyFolder:
         notes = SessionNotes(self.participants / pseudonym_of(number))
         withdrawal = notes.withdrawn
         if withdrawal is None:
-            withdrawal = Withdrawal(when, during=not self.session(number).is_complete)
+            folder = SessionFolder.read(self.participants / pseudonym_of(number), self.plan)
+            withdrawal = Withdrawal(when, during=not folder.is_complete)
             notes.keep_withdrawal(withdrawal)
         if delete and not withdrawal.deleted:
             notes.delete_all_else()
@@ -142,6 +143,7 @@ class StudyFolder:
         folder = SessionFolder.read(self.participants / pseudonym_of(number), self.plan)
         if faults := _faults_of(folder.session, self.plan):
             raise InvalidRunFolder(folder.path, f"its session.json does not fit the plan: {'; '.join(faults)}")
+        folder.check()
         return folder
 
     def begin(self, session: Session) -> "SessionFolder":
@@ -223,7 +225,7 @@ def _missing_of(path: Path) -> list[str]:
 
 
 def _faults_of(session: Session, plan: StudyPlan) -> list[str]:
-    """Return why a session cannot begin; a person who may not take part leaves nothing."""
+    """Return what the plan does not allow of a session; a person who may not take part leaves nothing."""
     faults = [] if session.pilot else _not_confirmed(session, plan)
     if session.device not in plan.devices:
         faults.append(f"the plan has no device {session.device!r}; it has {', '.join(plan.devices)}")

@@ -287,8 +287,9 @@ def _faults(plan: _Plan) -> Iterator[str]:
     for kind, names in (("statements", plan.statements), ("questions", questions)):
         if len(set(names)) < len(names):
             yield f"{kind}: a name is given twice"
-    if taken := [name for name in questions if name in _COLUMNS]:
-        yield f"questions: {taken[0]} is another column of questionnaire.csv; choose another name"
+    for name in questions:
+        if name in _COLUMNS:
+            yield f"questions: {name} is another column of questionnaire.csv; choose another name"
     for k, question in enumerate(plan.questions, 1):
         if len(set(question.choices)) < len(question.choices):
             yield f"questions[{k}].choices: a choice is given twice"

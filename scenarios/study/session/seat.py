@@ -77,7 +77,7 @@ class StudySeat:
         webcam: hashes of the files by which a webcam leads the hand, kept with each run that it leads.
 
     Attributes:
-        on_run: gets where the hand is as a run begins; None without a tracker.
+        on_run: is sent the hand's pose as a run begins; None without a tracker.
         on_round_end: is given each round that has ended, with its record or why it does not count; None: nobody is.
     """
 
@@ -106,7 +106,7 @@ class StudySeat:
         return self._practice
 
     async def sit(self, page: WebSocket) -> None:
-        """Let a page that was accepted have the seat until it goes; another one gets that it is taken."""
+        """Let a page that was accepted have the seat until it goes; another one is refused."""
         if self._leaving.locked():
             await send_json(page, {"wait": "one_moment"})
         async with self._leaving:

@@ -139,7 +139,7 @@ def listening_socket(host: str, port: int) -> socket.socket:
 
 
 class _Server(uvicorn.Server):
-    """A server that ends at Ctrl-C and SIGTERM, and lets the rest of the command know."""
+    """A server that ends at Ctrl-C and SIGTERM, and lets the command go on."""
 
     @contextlib.contextmanager
     def capture_signals(self) -> Generator[None, None, None]:

@@ -1,7 +1,7 @@
 """A hand tracker beside a study's page: it connects to `ws://HOST:PORT/hand`, and sends what `hand_messages` says.
 
 With a token the path is below it, as the page's is. One tracker at a time leads the hand, in sessions whose participant
-has chosen it; its samples between two runs are passed over. At each run's start it gets where the hand is.
+has chosen it; its samples between two runs are passed over. At each run's start it is sent the hand's pose.
 """
 
 from starlette.websockets import WebSocket, WebSocketDisconnect

@@ -205,9 +205,6 @@ CALLS: dict[str, Callable[[Any], object]] = {
     "another algorithm in the options": lambda h: h.run(
         "ir_grasp", algorithm="jacobi", options=h.MasterOptions(algorithm=h.Algorithm.NEWTON)
     ),
-    "another algorithm than the default in the options": lambda h: h.run(
-        "ir_grasp", algorithm="jacobi", options=h.MasterOptions(algorithm=h.Algorithm.GAUSS_SEIDEL)
-    ),
     "other isolated units in the options": lambda h: h.run(
         "ir_grasp", isolate="scene", options=h.MasterOptions(isolated=("reflex",))
     ),

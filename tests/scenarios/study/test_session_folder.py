@@ -206,6 +206,7 @@ def test_answers_that_the_plan_does_not_allow_are_in_no_table(file: str, entries
     place.write_text(json.dumps({**json.loads(place.read_text()), **entries}))
     with pytest.raises(InvalidRunFolder, match="does not fit the plan"):
         study.write_tables()
+    assert study.withdraw(1, "2026-11-30", delete=True).deleted
 
 
 def test_no_session_begins_in_a_folder_that_was_removed_meanwhile(tmp_path: Path):

@@ -191,14 +191,14 @@ def record_of_first(session_folder: Path) -> object:
 
 
 @pytest.mark.parametrize(
-    ("without", "repetitions", "fewest"),
+    ("without", "repetitions"),
     [
         # The second is short. How well the script leads the hand depends on what else the machine does.
-        pytest.param("human_to_robot|collaborative", 1, 0, marks=pytest.mark.slow, id="two rounds"),
-        pytest.param("", 2, 9, marks=pytest.mark.real_time, id="twelve rounds"),
+        pytest.param("human_to_robot|collaborative", 1, marks=pytest.mark.slow, id="two rounds"),
+        pytest.param("", 2, marks=pytest.mark.real_time, id="twelve rounds"),
     ],
 )
-def test_a_scripted_pilot_plays_rounds_that_survive_a_kill(without: str, repetitions: int, fewest: int, tmp_path: Path):
+def test_a_scripted_pilot_plays_rounds_that_survive_a_kill(without: str, repetitions: int, tmp_path: Path):
     plan = pilot_plan(
         tmp_path / "plan.toml", devices='["mouse", "script"]', patience=60, practice=2, repetitions=repetitions,
         without=without,
@@ -221,7 +221,8 @@ def test_a_scripted_pilot_plays_rounds_that_survive_a_kill(without: str, repetit
     assert rounds["round"].tolist() == [r.number for r in session.rounds]
     assert (rounds["kind"] == "scripted pilot").all()
     assert not rounds["void"].any()
-    assert rounds["success"].sum() >= fewest, rounds[["task", "behaviour", "reason"]].to_string()
+    if not without:
+        assert rounds["success"].sum() >= 9, rounds[["task", "behaviour", "reason"]].to_string()
     assert rounds["latency_p95_ms"].notna().all()
     assert len(pd.read_csv(session_folder / "answers.csv")) == 3 * len(session.rounds)
     assert session.session.device == "script"
