@@ -75,7 +75,7 @@ def test_what_is_no_record_is_refused_where_it_is_opened(tmp_path: Path, wording
 def test_a_record_of_which_some_bytes_are_others_is_refused(tmp_path: Path):
     file = tmp_path / "r.parquet"
     values = np.random.default_rng(0).random(500)  # nothing of them can be compressed
-    batch: Any = pa.record_batch({"time": np.arange(500.0), "a.x": values})
+    batch: Any = pa.record_batch(cast(Any, {"time": np.arange(500.0), "a.x": values}))
     write_parquet(file, batch.schema, [batch])
     before: Any = pq.read_table(file)
     file.write_bytes(file.read_bytes().replace(values[100].tobytes(), np.float64(1e300).tobytes()))
