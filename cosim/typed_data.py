@@ -46,6 +46,10 @@ Text = Annotated[str, Meta(pattern=NOT_BLANK)]
 """A text that is not empty."""
 Name = Annotated[str, Meta(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
 """A name of any kind that could be a column's."""
+UNIT_NAME = r" *[^\s\x00-\x1f][^\x00-\x1f]*"
+"""A unit's name in a system: something that is seen, in one line."""
+PortName = Annotated[str, Meta(pattern=rf"(?s)^{UNIT_NAME}\..")]
+"""A port with its unit, `UNIT.PORT`."""
 FilePath = Annotated[str, Meta(pattern=r"^[^\x00]+$", max_length=4096)]
 """The path of a file."""
 

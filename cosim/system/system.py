@@ -4,6 +4,8 @@
 connections whose ports do not fit each other.
 """
 
+import re
+from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from fractions import Fraction
@@ -44,6 +46,7 @@ from handover.cosim.system.wiring_faults import (
     series_fault,
     value_faults,
 )
+from handover.cosim.typed_data import UNIT_NAME
 
 
 class System:
@@ -91,6 +94,8 @@ class System:
         if not isinstance(fmu, (str, PathLike, FmuDescription)):  # type: ignore
             raise TypeError(f"unit {name}: fmu = {fmu!r:.60}: expected the path of an FMU, such as 'arm.fmu'")
         description = fmu if isinstance(fmu, FmuDescription) else self._described(Path(fmu))
+        if not re.fullmatch(UNIT_NAME, name):
+            self._faults.append(f"a unit is called {name!r:.60}: expected a name that is seen, in one line")
         if name in self.units:
             self._faults.append(f"two units are called {name!r}")
         period = self._period(name, description.experiment, period)
@@ -353,6 +358,8 @@ class System:
             *self._unmatched.values(),
             *(str(left) for x in self._unsettled if (left := x.remaining(self._feeds(x.target)))),
         ]
+        outputs = Counter(f"{name}.{port}" for name, u in self.units.items() for port in u.description.outputs)
+        faults += [f"two outputs are called {name}: call a unit otherwise" for name, n in outputs.items() if n > 1]
         faults += [ambiguity(to, [c.source for c in cs]) for to, cs in self._matches.items() if len(cs) > 1]
         if not isinstance(self.start, Rational):  # type: ignore
             faults.append(f"its start, {self.start!r}, is not exact; give Fraction('{self.start!r}')")

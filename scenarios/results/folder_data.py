@@ -10,11 +10,8 @@ from typing_extensions import NotRequired, TypedDict
 
 from handover.cosim.fmu.unit_warnings import WarningData
 from handover.cosim.stepping.options import Algorithm
-from handover.cosim.typed_data import Count, ExactSeconds, ExactTime, FilePath, NotNegative, Seed
+from handover.cosim.typed_data import Count, ExactSeconds, ExactTime, FilePath, NotNegative, PortName, Seed
 from handover.scenarios.results.not_finite import NotFiniteData
-
-PortName = Annotated[str, Meta(pattern=r".\..")]
-"""A port with its unit, `UNIT.PORT`."""
 
 
 class AdaptiveData(TypedDict):

@@ -19,6 +19,8 @@ from handover.cosim.master.master import Master
 from handover.cosim.ssp.writing import write_ssp
 from handover.cosim.system.system import PortName, System
 from handover.cosim.system.wiring_faults import doubt, mismatch, obstacle
+from handover.cosim.typed_data import InvalidData, checked
+from handover.cosim.typed_data import PortName as ReadName
 
 M, NM = BaseExponents(m=1), BaseExponents(kg=1, m=2, s=-2)
 
@@ -58,6 +60,41 @@ def test_an_input_is_fed_once(fmu: FmuOf):
     s.check()
     s.connect(b.y.x, spring.u.x)
     assert faults_of(s) == ("spring.x is fed twice: by a.x and by b.x",)
+
+
+@pytest.mark.parametrize("name", ["arm", "system.arm", "a/b", " the arm", ".", "", " ", "\t", "a\nb", "\n.a", "a\0"])
+def test_a_unit_can_be_called_as_a_ports_name_that_is_read_begins(fmu: FmuOf, name: str):
+    s, is_read = System(), True
+    s.add(name, fmu("Mass"))
+    try:
+        checked([f"{name}.x"], list[ReadName])
+    except InvalidData:
+        is_read = False
+    assert is_read == (name.strip() != "" and name.isprintable())
+    if is_read:
+        s.check()
+    else:
+        assert len(faults_of(s)) == 1
+
+
+def test_two_outputs_have_two_names(fmu: FmuOf):
+    s = System()
+    mass = describe_fmu(fmu("Mass"))
+    s.add("a", replace(mass, outputs={"b.x": mass.outputs["x"]}))
+    s.check()
+    s.add("a.b", mass)
+    (fault,) = faults_of(s)
+    assert "a.b.x" in fault
+
+
+def test_an_entry_of_an_array_is_refused_with_what_connects_it(fmu: FmuOf):
+    s = System()
+    counter, spring = s.add("counter", fmu("Counter")), s.add("spring", fmu("Spring"))
+    with pytest.raises(TypeError, match=r"^counter\.pair\[1\]: .*a block of yours"):
+        s.connect(counter.y.pair[1], spring.u.x)
+    s.connect(counter.y["pair[1]"], spring.u.x)
+    (fault,) = faults_of(s)
+    assert "a block of yours" in fault
 
 
 @pytest.mark.parametrize("content", [None, b"no zip", b""])
