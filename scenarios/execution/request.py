@@ -264,7 +264,7 @@ def _type_of_file(
 
 
 def check_subject(subject: object) -> None:
-    """Reject what is neither a text, nor a system, nor a scenario's class.
+    """Reject what is neither a text, nor a system of units, nor a scenario's class.
 
     Raises:
         UsageError: it is something else.
@@ -277,3 +277,5 @@ def check_subject(subject: object) -> None:
     elif not isinstance(subject, (str, System)):
         right = "expected a scenario's name or class, a system, or the path of an SSP or FMU"
         raise UsageError(f"{subject!r} cannot be run: {right}")
+    elif isinstance(subject, System) and not subject.units:
+        raise UsageError("the system has no units: add one, such as by system.add('arm', 'arm.fmu')")

@@ -148,6 +148,7 @@ CALLS: dict[str, Callable[[Any], object]] = {
     "all faults": lambda h: h.run("ir_grasp", strategi="reflex", forward=-1, literal=np.bool_(True)),
     "a class of one's own": lambda h: h.run(Nearer, strategi="blind"),
     "system without a stop time": lambda h: h.run(system()),
+    "system without units": lambda h: h.run(h.System(), stop=1),
     "system with parameters": lambda h: h.run(system(), stop=1, seed=3, mass=3),
     "seed beyond all numbers": lambda h: h.run("ir_grasp", seed=10**310),
     "half a seed": lambda h: h.run("ir_grasp", seed=0.5),
