@@ -22,6 +22,7 @@ def run_html(facts: RunFacts, metrics: Mapping[str, float], record: Record | Non
     summary = facts.summary
     faults, pictures = ToleratedFaults(), list[Markup]()
     if record is not None:
+    faults.lines += filter(None, [facts.missing_record])
         with faults.tolerated("the figures over time could not be drawn"):
             figures, left_out = _time_figures(facts, record)
             pictures = _pictures(figures[:_MAX_FIGURES], record)

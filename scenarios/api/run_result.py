@@ -86,7 +86,7 @@ class Run:
         with errors_for_python():
             facts = RunFacts.read(self._place)
             self._facts = facts if experiment is None else replace(facts, experiment=experiment)
-            if not self._facts.ended:
+            if not (self._facts.ended and self._place.signals.exists()):
                 with self._place.held():
                     complete_signals(self._place)
 
@@ -215,5 +215,6 @@ class Run:
         with errors_for_python():
             record = whole_record_of(self._place)
             if record is None:
-                raise InvalidRunFolder(self.folder, "it has no record: the run ended before its first step")
+                none = "it has no record: the run ended before its first step"
+                raise InvalidRunFolder(self.folder, self._facts.missing_record or none)
             return record

@@ -84,7 +84,8 @@ def film_content(folder: RunFolder, names: Sequence[str] | None, height: int) ->
     """
     facts, record = RunFacts.read(folder), record_of(folder)
     if record is None:
-        raise InvalidRunFolder(folder.path, "there is nothing to film: its record has less than two rows")
+        why = facts.missing_record or "its record has less than two rows"
+        raise InvalidRunFolder(folder.path, f"there is nothing to film: {why}")
     faults = ToleratedFaults()
     replay, own = None, list[TimePlot]()
     try:

@@ -58,7 +58,8 @@ def draw_run(folder: RunFolder) -> list[str]:
     """
     facts, record = RunFacts.read(folder), record_of(folder)
     if record is None:
-        raise InvalidRunFolder(folder.path, "there is nothing to draw: its record has less than two rows")
+        why = facts.missing_record or "its record has less than two rows"
+        raise InvalidRunFolder(folder.path, f"there is nothing to draw: {why}")
     unfinished, faults = folder.path / "figures.part", ToleratedFaults(InvalidParameter, KeyError)
     with disk_errors_reported(folder.figures):
         try:

@@ -45,6 +45,7 @@ def write_run_page(folder: RunFolder, file: Path | None = None) -> list[str]:
     """
     facts = RunFacts.read(folder)
     record, faults = record_of(folder), ToleratedFaults()
+    faults.lines += filter(None, [facts.missing_record])
     replay, plots = _sections_of_scenario(facts, record, faults)
     sections = [
         replay,

@@ -58,6 +58,12 @@ class RunFacts:
         return [f"plots over time and replay: {code}"] if code else []
 
     @property
+    def missing_record(self) -> str:
+        """That the record is not there though the run had one, else ""."""
+        simulated, file = self.summary.get("simulated_seconds", 0.0), self.folder.signals
+        return "" if file.exists() or not simulated else f"its {file.name} is missing, the record of {simulated:g} s"
+
+    @property
     def scenario(self) -> str:
         """The scenario's name."""
         return self.run["scenario"]

@@ -89,6 +89,18 @@ def test_replay_and_report_are_pages(tmp_path: Path):
     run = handover.Run(copied_run(tmp_path / "run", "run", "ir_grasp", "--no-report"))
     replay = run.replay()
     assert 'class="replay"' in replay.html
+def test_a_record_that_is_missing_is_named_where_the_run_had_one(tmp_path: Path):
+    folder = copied_run(tmp_path / "run", "run", "ir_grasp", "--no-report")
+    (folder / "signals.parquet").unlink()
+    run = handover.load(folder)
+    assert isinstance(run, handover.Run)
+    for shows in (lambda: run.signals, lambda: run.report(figures=True)):
+        with pytest.raises(handover.InvalidInput, match=r"signals\.parquet is missing"):
+            shows()
+    for html in (run._repr_html_(), run.report().html):
+        assert "signals.parquet is missing" in html
+
+
     saved = replay.save(tmp_path / "replay.html")
     assert saved.path is not None
     assert saved.path.read_text(encoding="utf-8") == replay.html
