@@ -138,11 +138,11 @@ class Record:
             raise InvalidRecord(path, f"the metadata of its column {signal!r} are damaged: {one_line(e)}") from e
 
     def __contains__(self, signal: object) -> bool:
-        """Return whether a signal of this name was recorded."""
-        return signal in self._columns
+        """Return whether a signal of this name, or an entry of an array, was recorded."""
+        return signal in self._columns or signal in self._table.column_names
 
     def __getitem__(self, signal: str) -> NDArray[Any]:
-        """Return a signal over time; an array port has its shape after the first axis.
+        """Return a signal over time; an array port has its shape after the first axis, its entry `arm.p_WG[1]` none.
 
         Raises:
             KeyError: no such signal was recorded.
@@ -192,9 +192,11 @@ class Record:
         return self._table.schema.field(self._columns_of(signal)[0]).metadata or {}
 
     def _columns_of(self, signal: str) -> list[str]:
-        if signal not in self._columns:
+        if signal in self._columns:
+            return self._columns[signal]
+        if signal not in self:
             raise KeyError(f"no signal {signal!r}; {nearest(signal, self._columns)}")
-        return self._columns[signal]
+        return [signal]
 
     def _values(self, name: str) -> NDArray[Any]:
         from handover.cosim.record.columns import column_values  # slow to import, as what imports pyarrow

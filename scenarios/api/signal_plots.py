@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from handover.cosim.exceptions import nearest
 from handover.scenarios.api.signals import SignalTable
@@ -43,7 +42,7 @@ def plot_signals(signals: SignalTable, names: Sequence[str], axes: Axes | None =
     """
     if not names:
         raise ValueError("no signal is named: plot('arm.p_WG') draws one")
-    if unknown := [n for n in names if n not in signals and _element(signals, n) is None]:
+    if unknown := [n for n in names if n not in signals]:
         raise KeyError("; ".join(f"no signal {n!r}: {nearest(n, signals)}" for n in unknown))
     if axes is not None and len(names) > 1:
         raise ValueError(f"{len(names)} signals for one pair of axes; expected one")
@@ -65,23 +64,13 @@ def plot_signals(signals: SignalTable, names: Sequence[str], axes: Axes | None =
 
 
 def _draw(axes: Axes, signals: SignalTable, name: str) -> None:
-    element, whole = _element(signals, name), name if name in signals else str(name).rpartition("[")[0]
-    values, items = signals[whole], signals.item_names(whole)
-    label = name.rpartition(".")[2]
-    elements = list(elements_of(label, values).items())[: len(COLOURS)] if element is None else [(label, element)]
+    values, items = signals[name], signals.item_names(name)
+    elements = list(elements_of(name.rpartition(".")[2], values).items())[: len(COLOURS)]
     held = values.dtype.kind != "f"
     curves = [Curve(label=label, values=column.astype(np.float64), held=held) for label, column in elements]
-    plot = TimePlot(title=name, quantity=name, unit=unit_symbol(signals.unit(whole)), curves=curves)
+    plot = TimePlot(title=name, quantity=name, unit=unit_symbol(signals.unit(name)), curves=curves)
     draw_time_plot(axes, plot, signals.time)
     if items:
         axes.set_yticks(list(items), [text.replace("_", " ").lower() for text in items.values()])
     if len(curves) > 1:
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
-
-
-def _element(signals: SignalTable, name: str) -> NDArray[Any] | None:
-    """Return an element of a signal over time, by its name in the record, `arm.p_WG[3]`; None if there is none."""
-    whole = str(name).rpartition("[")[0]
-    if name in signals or whole not in signals:
-        return None
-    return elements_of(whole, signals[whole]).get(name)

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 class SignalTable(Mapping[str, NDArray[Any]]):
     """The outputs of all units over time: `signals["arm.p_WG"]` has a row for each entry of `time`.
 
-    An array port has its shape after the first axis; enumerations are integers, see `item_names`. Texts and
-    pictures are not recorded.
+    An array port has its shape after the first axis; `signals["arm.p_WG[1]"]` is its first entry alone. Enumerations
+    are integers, see `item_names`. Texts and pictures are not recorded.
 
     Attributes:
         time: in seconds, shape (rows,).

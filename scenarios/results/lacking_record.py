@@ -53,7 +53,7 @@ class LackingRecord(Record):
         return np.full((len(self.time), *declared.shape), np.nan)
 
     def _metadata(self, signal: str) -> dict[bytes, bytes]:
-        return super()._metadata(signal) if signal in self.signals else {}
+        return super()._metadata(signal) if signal in self else {}
 
     def _declared(self, signal: str) -> Variable | None:
         """Return the output as the scenario's own unit declares it; None if there is none, or it is never recorded."""

@@ -40,8 +40,12 @@ def test_signals_are_arrays_by_name(run: handover.Run):
     assert signals.units["scene.yaw"] == "rad"
     assert "reflex.phase" in list(signals)
     assert "REACH" in signals.item_names("reflex.phase").values()
-    with pytest.raises(KeyError, match=r"did you mean scene\.p_WH"):
-        signals["scene.p_WHH"]
+    assert signals["scene.p_WH[2]"].tolist() == signals["scene.p_WH"][:, 1].tolist()
+    assert signals.unit("scene.p_WH[2]") == "m"
+    for name in ("scene.p_WHH", "scene.p_WH[0]", "scene.p_WH[3]", "scene.yaw[1]"):
+        assert name not in signals
+        with pytest.raises(KeyError, match=r"did you mean scene\.(p_WH|yaw)"):
+            signals[name]
 
 
 def test_signals_become_a_table(run: handover.Run, monkeypatch: pytest.MonkeyPatch):
@@ -85,10 +89,6 @@ def test_plots_have_names_and_units_at_their_axes(run: handover.Run):
             run.plot(*names)
 
 
-def test_replay_and_report_are_pages(tmp_path: Path):
-    run = handover.Run(copied_run(tmp_path / "run", "run", "ir_grasp", "--no-report"))
-    replay = run.replay()
-    assert 'class="replay"' in replay.html
 def test_a_record_that_is_missing_is_named_where_the_run_had_one(tmp_path: Path):
     folder = copied_run(tmp_path / "run", "run", "ir_grasp", "--no-report")
     (folder / "signals.parquet").unlink()
@@ -101,6 +101,10 @@ def test_a_record_that_is_missing_is_named_where_the_run_had_one(tmp_path: Path)
         assert "signals.parquet is missing" in html
 
 
+def test_replay_and_report_are_pages(tmp_path: Path):
+    run = handover.Run(copied_run(tmp_path / "run", "run", "ir_grasp", "--no-report"))
+    replay = run.replay()
+    assert 'class="replay"' in replay.html
     saved = replay.save(tmp_path / "replay.html")
     assert saved.path is not None
     assert saved.path.read_text(encoding="utf-8") == replay.html
