@@ -1,7 +1,7 @@
 """What a notebook shows of a run and of a campaign: verdict, headline, and pictures of the plots over time."""
 
 import base64
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 
 from markupsafe import Markup
 
@@ -11,37 +11,32 @@ from handover.scenarios.experiment.parameters import parameters_of
 from handover.scenarios.experiment.time_plot import TimeFigure
 from handover.scenarios.results.lacking_record import LackingRecord
 from handover.scenarios.results.run_facts import RunFacts
+from handover.scenarios.results.tables import headline_rows
 from handover.scenarios.results.tolerated_faults import ToleratedFaults
 
 _MAX_FIGURES = 2
 _GOOD, _BAD = "#2e7d32", "#c62828"
 
 
-def run_html(facts: RunFacts, metrics: Mapping[str, float], record: Record | None) -> str:
+def run_html(facts: RunFacts, record: Record | None) -> str:
     """Return a run's verdict with its reason, the metrics of its headline, and its first plots over time."""
     summary = facts.summary
     faults, pictures = ToleratedFaults(), list[Markup]()
-    if record is not None:
     faults.lines += filter(None, [facts.missing_record])
+    if record is not None:
         with faults.tolerated("the figures over time could not be drawn"):
             figures, left_out = _time_figures(facts, record)
             pictures = _pictures(figures[:_MAX_FIGURES], record)
             faults.lines += [f"Left out: {line}." for line in left_out]
-    rows = [(_description(facts, name), str(metrics[name])) for name in facts.headline if name in metrics]
     return str(
         Markup("<div>{}{}{}{}<p><small>results: {}</small></p></div>").format(
             _verdict(facts.scenario, good=bool(summary["success"]), reason=str(summary["reason"])),
             Markup().join(Markup("<p>{}</p>").format(line) for line in faults.lines),
-            table_html((), rows),
+            table_html((), headline_rows(summary["metrics"], facts.headline)),
             Markup().join(pictures),
             str(facts.folder.shown),
         )
     )
-
-
-def _description(facts: RunFacts, name: str) -> str:
-    """Return what a metric is; its name where the run does not say."""
-    return str(facts.summary["metrics"][name].get("description") or name)
 
 
 def _verdict(name: str, *, good: bool, reason: str) -> Markup:

@@ -208,7 +208,7 @@ class Run:
         from handover.scenarios.api.notebook_forms import run_html  # draws figures
 
         with errors_for_python():
-            return run_html(self._facts, self.metrics, record_of(self._place))
+            return run_html(self._facts, record_of(self._place))
 
     @functools.cached_property
     def _record(self) -> Record:

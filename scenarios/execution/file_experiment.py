@@ -20,6 +20,7 @@ from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System
 from handover.scenarios.experiment.experiment import Evaluator, Experiment, FmuOf, Metric, Outcome
 from handover.scenarios.experiment.time_plot import TimeFigure
+from handover.scenarios.results.tables import LAST
 
 ENDLESS = Fraction(10**6)
 """The duration of what a program steps as far as it likes, s: its end is never reached."""
@@ -154,7 +155,7 @@ def _headline(system: System, *, alone: bool) -> tuple[str, ...]:
             if port.kind in (Kind.STRING, Kind.BINARY) or port.size > MAX_ENTRIES:
                 continue
             names = [name if alone else f"{unit}.{name}" for name in element_names(port)]
-            last += [f"last_{name}" for name in names]
+            last += [f"{LAST}{name}" for name in names]
             if port.kind in (Kind.REAL, Kind.INTEGER):
                 ranges += [f"{end}_{name}" for name in names for end in ("min", "max")]
     few = len(last) + len(ranges) <= _MAX_HEADLINE
@@ -198,7 +199,7 @@ def _metrics(signals: Path, prefix: str) -> dict[str, Metric]:
     ranges: dict[str, Metric] = {}
     for column in columns if rows else ():
         name, unit = column.removeprefix(prefix), about[column]["unit"]
-        found[f"last_{name}"] = Metric(last[column], unit, f"last value of {name}{_not_finite(last[column])}")
+        found[f"{LAST}{name}"] = Metric(last[column], unit, f"last value of {name}{_not_finite(last[column])}")
         if not about[column]["items"] and not pa.types.is_boolean(schema.field(column).type):
             none = "" if np.isfinite(low[column]) else ", none of which is finite"
             ranges[f"min_{name}"] = Metric(low[column], unit, f"smallest value of {name}{none}")

@@ -3,10 +3,11 @@
 The command line and the report page show the same rows.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import fields
 from typing import Any, cast
 
+from handover.cosim.exceptions import counted
 from handover.cosim.master.pacing import PaceReport
 from handover.cosim.stepping.options import Algorithm
 from handover.cosim.system.conversion import LinearTransformation
@@ -102,6 +103,19 @@ def format_conversion(conversion: Mapping[str, Any]) -> tuple[str, str]:
 
 def _with_unit(port: str, unit: str) -> str:
     return f"{port} ({unit})" if unit else port
+
+
+LAST = "last_"
+"""What the names of a file's metrics begin with that are the last value of an output."""
+
+
+def headline_rows(metrics: Mapping[str, Any], headline: Collection[str]) -> list[tuple[str, str]]:
+    """Return description and value of the metrics shown first; where these are last values, how many more there are."""
+    rows = [(metrics[n].get("description") or n, format_metric(metrics[n])) for n in headline if n in metrics]
+    if all(n.startswith(LAST) for n in headline):
+        more = sum(n.startswith(LAST) and n not in headline for n in metrics)
+        rows += [(f"and {counted(more, 'last value')} more", "in summary.json")] if more else []
+    return rows
 
 
 def format_value(value: Any) -> str:

@@ -19,7 +19,7 @@ from handover.scenarios.execution.progress import doing, say
 from handover.scenarios.experiment.experiment import Outcome
 from handover.scenarios.results.run_folder import RunFolder, disk_errors_reported
 from handover.scenarios.results.summary import RunResult
-from handover.scenarios.results.tables import format_conversion, format_metric, pace_rows, warning_lines
+from handover.scenarios.results.tables import format_conversion, headline_rows, pace_rows, warning_lines
 from handover.scenarios.results.task import Task
 from handover.scenarios.results.tolerated_faults import ToleratedFaults
 
@@ -45,8 +45,7 @@ def _print_verdict(result: RunResult, headline: Sequence[str], folder: RunFolder
     console.print(f"{summary['scenario']} {verdict}: ", end="")
     console.print(summary["reason"], markup=False, soft_wrap=True)
     metrics = summary["metrics"]
-    first = headline or result.outcome.metrics
-    rows = [(metrics[n]["description"] or n, format_metric(metrics[n])) for n in first if n in metrics]
+    rows = headline_rows(metrics, headline or result.outcome.metrics)
     rows.append(("simulated", f"{summary['simulated_seconds']:.1f} s in {summary['wall_seconds']:.1f} s of wall time"))
     rows += pace_rows(summary)
     rows += _conversion_rows(folder)

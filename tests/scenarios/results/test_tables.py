@@ -18,7 +18,7 @@ from handover.cosim.typed_data import InvalidData, checked
 from handover.scenarios.reporting.run_page import write_run_page
 from handover.scenarios.results.folder_data import Summary
 from handover.scenarios.results.run_folder import RunFolder
-from handover.scenarios.results.tables import master_rows, pace_rows
+from handover.scenarios.results.tables import headline_rows, master_rows, pace_rows
 
 
 class Page:
@@ -117,6 +117,15 @@ def test_warnings_of_units_are_reported_in_summary_json_terminal_report_and_pyth
     loaded = handover.load(out)
     assert isinstance(loaded, handover.Run)
     assert list(loaded.warnings) == lines
+
+
+def test_of_many_last_values_a_summary_says_how_many_it_leaves_out():
+    metrics = {name: {"value": 1.0, "unit": "m"} for name in ("last_x", "last_y", "last_z", "min_x")}
+    *shown, more = headline_rows(metrics, ("last_x",))
+    assert [name for name, _ in shown] == ["last_x"]
+    assert more[0] == "and 2 last values more"
+    assert len(headline_rows(metrics, ("last_x", "last_y", "last_z"))) == 3
+    assert len(headline_rows(metrics, ("min_x", "last_x"))) == 2
 
 
 def test_iterations_are_reported_once():
