@@ -156,7 +156,8 @@ def named_by_archive(folder: Path, archive: Path) -> Generator[None, None, None]
         del _unpacked[folder]
 
 
-def _shown(path: Path) -> str:
+def shown_path(path: Path) -> str:
+    """Return a path as messages name it, `ARCHIVE: MEMBER` in a folder of `named_by_archive`."""
     for folder, archive in _unpacked.items():
         if path.is_relative_to(folder):
             return f"{archive}: {path.relative_to(folder).as_posix()}"
@@ -170,7 +171,7 @@ class InvalidFmu(CosimError):
     """
 
     def __init__(self, path: Path, fault: str, log: Sequence[str] = ()) -> None:
-        super().__init__(f"{_shown(path)}: {fault}")
+        super().__init__(f"{shown_path(path)}: {fault}")
         self.path, self.fault, self.log = path, fault, tuple(log)
 
 

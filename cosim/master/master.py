@@ -9,7 +9,14 @@ from types import TracebackType
 from typing import TypeVar
 
 from handover.cosim.check.run_faults import execution_tools, run_faults
-from handover.cosim.exceptions import InitializationError, InvalidFmu, ScheduleError, UnitFailure, WiringError
+from handover.cosim.exceptions import (
+    InitializationError,
+    InvalidFmu,
+    ScheduleError,
+    UnitFailure,
+    WiringError,
+    shown_path,
+)
 from handover.cosim.fmu.calls import is_rounding
 from handover.cosim.fmu.failures import UnitCrashed, UnitHung, UnitTerminated
 from handover.cosim.fmu.file.archive import DESCRIPTION
@@ -67,9 +74,9 @@ def _tell_of_faults(system: System, *, strict: bool) -> dict[Path, str]:
         if system.tolerated:
             raise WiringError(system.tolerated)
     for path, fault in untouched.items():
-        _log.warning("%s: its %s is not valid, which does not matter here: %s", path, DESCRIPTION, fault)
+        _log.warning("%s: its %s is not valid, which does not matter here: %s", shown_path(path), DESCRIPTION, fault)
     for path, fault in others.items():
-        _log.warning("%s: its %s is not valid: %s", path, DESCRIPTION, fault)
+        _log.warning("%s: its %s is not valid: %s", shown_path(path), DESCRIPTION, fault)
     for line in (*system.tolerated, *system.undefined_starts, *system.notes):
         _log.warning("%s", line)
     return faults

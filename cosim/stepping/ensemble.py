@@ -14,7 +14,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from handover.cosim.exceptions import CosimError, InvalidFmu
+from handover.cosim.exceptions import CosimError, InvalidFmu, shown_path
 from handover.cosim.files import scratch_folder
 from handover.cosim.fmu.calls import State
 from handover.cosim.fmu.failures import StartValuesLost, UnitTerminated
@@ -357,7 +357,7 @@ class Ensemble:
                 named[unpacked[d.path]].append(name)
             self._cleanups.add(functools.partial(self._free, instance))
             process = ", in a process of its own" if instance.isolated else ""
-            _log.info("%s: %s (FMI %d) of %s is loaded%s", name, d.name, d.fmi, d.path, process)
+            _log.info("%s: %s (FMI %d) of %s is loaded%s", name, d.name, d.fmi, shown_path(d.path), process)
             self.instances[name] = instance
         note_libraries(self.heartbeat, named)
 
