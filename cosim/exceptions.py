@@ -7,7 +7,7 @@ suggest the nearest valid name and find in a unit's log the line that gives the 
 import difflib
 import heapq
 import re
-from collections.abc import Collection, Generator, Iterable, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, ClassVar
@@ -54,16 +54,18 @@ def did_you_mean(names: Sequence[str]) -> str:
 def suggestion(name: object, valid: Iterable[str]) -> str:
     """Return "did you mean ...?" with the valid names that are nearest, "" where none is near.
 
-    Of many names those are compared that have most pairs of letters in common with it.
+    Nearest of all are those that end so, `arm.k` of `k`. Of many names those are compared that have most pairs of
+    letters in common with it.
     """
     text = str(name)[:_COMPARED]
-    names: Collection[str] = set(valid)
+    names = set(valid)
+    likeness = dict.fromkeys((n for n in names if text and n.endswith(f".{text}")), 1.0)
     if len(names) > _MANY:
         pairs = dict.fromkeys(re.escape(text[k : k + 2]) for k in range(len(text) - 1))
         common = re.compile("|".join(pairs)).findall
-        names = heapq.nlargest(_MANY, names, lambda n: len(common(n[:_COMPARED])) - 0.01 * abs(len(n) - len(text)))
-    matcher, likeness = difflib.SequenceMatcher(None, "", text), dict[str, float]()
-    for n in names:
+        names = set(heapq.nlargest(_MANY, names, lambda n: len(common(n[:_COMPARED])) - 0.01 * abs(len(n) - len(text))))
+    matcher = difflib.SequenceMatcher(None, "", text)
+    for n in names - likeness.keys():
         matcher.set_seq1(n[:_COMPARED])
         likeness[n] = matcher.ratio()
     least = max(_LIKE, max(likeness.values(), default=0.0) - _AS_LIKELY)

@@ -25,6 +25,8 @@ from handover.cosim.exceptions import (
         ("p[4]", ["p[3]", "p[1]", "p[2]"], "did you mean p[1] or p[2] or p[3]?"),
         ("p[0]", [f"p[{k}]" for k in (9, 7, 5, 3, 1)], "did you mean p[1] or p[3] or p[5]?"),
         ("forse", ["force_2", "force", "torque"], "did you mean force or force_2"),
+        ("k", ["tether.f", "tether.k", "k_0"], "did you mean tether.k"),
+        ("k", ["b.k", *(f"a.x_{i}" for i in range(200)), "a.k"], "did you mean a.k or b.k?"),
         ("x", ["alpha", "beta"], "valid: alpha, beta"),
         ("x", [], "there are none"),
     ],
