@@ -3,23 +3,29 @@
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
+from typing import Any, NoReturn
 
 from handover.cosim.blocks.variable import Causality
 from handover.cosim.exceptions import nearest
 from handover.cosim.fmu.file.description import FmuDescription
 from handover.cosim.system.conversion import LinearTransformation
 
+BY_ENTRIES = "arrays are connected as a whole; to connect entries, put a block of yours between the two that gives them"
+
 
 @dataclass(frozen=True)
 class PortName:
-    """One end of a connection: a port of a unit in a system, or one of its terminals."""
+    """One end of a connection: a port of a unit in a system, or one of its terminals. It has no entries."""
 
     unit: str
     port: str
 
     def __str__(self) -> str:
         return f"{self.unit}.{self.port}"
+
+    def __getitem__(self, index: object) -> NoReturn:
+        """Raise TypeError, which says how entries of arrays are connected."""
+        raise TypeError(f"{self}[{index!r}]: {BY_ENTRIES}")
 
 
 @dataclass(frozen=True)

@@ -5,12 +5,12 @@ from typing import Any
 
 from handover.cosim.blocks.start_values import fault_of
 from handover.cosim.blocks.units import Unit
-from handover.cosim.blocks.variable import Kind
+from handover.cosim.blocks.variable import ELEMENT, Kind
 from handover.cosim.exceptions import hints, nearest
 from handover.cosim.fmu.file.clocks import FmuClock
 from handover.cosim.fmu.file.description import FmuDescription, FmuPort
 from handover.cosim.system.conversion import LinearTransformation, needs_no_conversion
-from handover.cosim.system.port_names import Connection, PlacedUnit, PortName
+from handover.cosim.system.port_names import BY_ENTRIES, Connection, PlacedUnit, PortName
 from handover.cosim.system.time_series import TimeSeries, external_fault
 
 
@@ -172,4 +172,6 @@ def _find(units: Mapping[str, PlacedUnit], end: PortName, role: str) -> tuple[Fm
         return None, f"{end} is a terminal: connect it with one, or its ports one by one"
     if end.port in others:
         return None, f"{end} is an {'input' if role == 'output' else 'output'}, not an {role}"
+    if (entry := ELEMENT.match(end.port)) and entry["base"] in ports:
+        return None, f"{end} is an entry of {ports[entry['base']].signature}: {BY_ENTRIES}"
     return None, f"{end.unit} has no {role} {end.port!r}; {nearest(end.port, ports)}"
