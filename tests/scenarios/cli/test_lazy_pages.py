@@ -7,9 +7,10 @@ from pathlib import Path
 
 import click
 import pytest
+from click.testing import CliRunner
 
 from handover.scenarios.catalog import SCENARIOS, SYSTEMS
-from handover.scenarios.cli.command import COMMANDS, DeferredCommand, main
+from handover.scenarios.cli.command import COMMANDS, DeferredCommand, DeferringGroup, main
 
 PAGES = {"scipy.stats", "plotly", "networkx", "tsdownsample", "distributed", "handover.scenarios.reporting.page"}
 HEAVY = {"matplotlib", "scipy", "cv2", "plotly", "distributed", "dask", "pyarrow", "fmpy", "control", "exudyn"}
@@ -74,11 +75,8 @@ def test_scenarios_and_units_have_the_names_and_titles_by_which_they_are_listed(
         assert set(system.units) - {"AdmittanceController", "TendonArmFast"} == used  # which are for --unit
 
 
-def test_ctrl_c_while_a_command_loads_aborts_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-):
+def test_ctrl_c_while_a_command_loads_aborts_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     (tmp_path / "interrupted_command.py").write_text("raise KeyboardInterrupt\n")
     monkeypatch.syspath_prepend(tmp_path)
-    with pytest.raises(SystemExit) as ended:
-        DeferredCommand("interrupted", "interrupted_command:command").load()
-    assert (ended.value.code, capsys.readouterr().err) == (130, "Aborted!\n")
+    group = DeferringGroup("main", commands=[DeferredCommand("interrupted", "interrupted_command:command")])
+    assert CliRunner().invoke(group, ["interrupted"]).exit_code == 130
