@@ -66,6 +66,13 @@ def test_in_a_column_all_that_is_drawn_stays_within_the_paper_and_beside_the_leg
         assert min(float(text.get_fontsize()) for text in canvas.findobj(Text)) >= 7.0
 
 
+def test_many_numbers_are_places_on_an_axis_and_not_its_labels(tmp_path: Path, drawn: dict[str, Canvas]):
+    results = results_of("ir_grasp", [{"forward": f"{0.001 * k:g}"} for k in range(30)])
+    draw_campaign(results, tmp_path, ToleratedFaults())
+    (axes,) = drawn["success_by_point"].axes
+    assert 2 <= len(axes.get_xticks()) < 30
+
+
 def test_metrics_that_differ_after_a_dot_have_files_of_their_own_of_which_one_is_a_pdf(tmp_path: Path):
     results = results_of("unknown", [{}], 2, **{"arm.x": [1.0, 2.0], "arm.y": [2.0, 3.0]})
     draw_campaign(results, tmp_path, ToleratedFaults())
