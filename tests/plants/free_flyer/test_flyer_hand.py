@@ -89,6 +89,13 @@ def test_an_open_hand_bumps_what_is_before_its_palm_and_not_what_it_has_passed()
         assert (hand.kept_off(DT, too_far, thing.body).p[0] < 0.03) is bumps
 
 
+def test_a_palm_yields_where_the_arm_does():
+    thing, weak = free_object(), replace(CALM, arm_force_max=0.5, arm_stiffness=100.0)
+    palm = FlyerHand(weak, (-0.02, 0.07, 0.0), IDENTITY).palm(Frame((0.05, 0.07, 0.0), IDENTITY), thing.body)
+    assert palm is not None
+    assert palm.depth == pytest.approx(0.005)
+
+
 def test_a_bump_is_one_push_and_no_stronger_than_the_arm():
     """The thumb stands before the palm: each pushed with the arm's limit."""
     felt: list[float] = []

@@ -9,7 +9,8 @@ from numpy.random import Generator
 
 from handover.cosim.blocks.geometry import Pinhole, looking_at, quaternion_of
 from handover.plants.helix.cameras.painting import Backdrop, Canvas
-from handover.plants.helix.cameras.shapes import Decal, Pixels, PolygonLayer
+from handover.plants.helix.cameras.shapes import Decal, Pixels, PolygonLayer, gripper
+from handover.plants.helix.gripper_fingers import finger_joints
 
 WIDTH, HEIGHT = 300, 170  # no multiples of a band or of a cell
 ROUND = np.linspace(0.0, 2.0 * np.pi, 9)[:-1]
@@ -85,3 +86,10 @@ def test_a_decal_hides_what_is_behind_it_by_its_opacity():
     np.testing.assert_allclose(half, without * (1.0 - 128.0 / 255.0), atol=1.5)
     behind = composed(canvas, [wide], [replace(square(90.0, 75.0, 20.0), depth=3.0)])[85, 100].astype(int)
     np.testing.assert_array_equal(behind, without)
+
+
+def test_a_grippers_stem_ends_among_the_roots_of_its_fingers():
+    p_WG, R_WG = np.array([0.1, 0.2, -0.6]), np.diag([1.0, -1.0, -1.0])
+    stem = gripper(p_WG - 0.1 * R_WG[:, 2], p_WG, R_WG, 0.5).points[0]
+    roots = finger_joints(p_WG, R_WG, 0.5)[:, 0]
+    np.testing.assert_allclose((stem[-1] - p_WG) @ R_WG, [0.0, 0.0, ((roots - p_WG) @ R_WG)[:, 2].mean()], atol=3e-3)

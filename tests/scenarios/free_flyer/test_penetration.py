@@ -13,10 +13,11 @@ from scipy.spatial.transform import Rotation
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.system import System
 from handover.fmus.build import cached
+from handover.plants.free_flyer.hand.parameters import Params as PersonParams
 from handover.scenarios.execution.unit_values import built_system
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.free_flyer.handover.handovers import RobotToHuman
-from handover.scenarios.free_flyer.penetration import Solid, start_faults
+from handover.scenarios.free_flyer.penetration import Solid, robot_solids, start_faults
 from handover.scenarios.free_flyer.two_robots.two_robots import TwoRobots
 
 
@@ -60,6 +61,12 @@ def test_a_start_in_another_body_is_refused_with_the_way_out(
         assert way is not None
         p = p + np.array([float(x) for x in way[1].split(",")])
     assert not found
+
+
+def test_an_arm_reaches_from_the_face_of_its_cube_to_the_palm():
+    cube, arm = robot_solids("robot", np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), np.array([-0.6, 0.0, 0.0]))
+    assert arm.p[0] + arm.half[0] == pytest.approx(-cube.half[0])
+    assert arm.p[0] - arm.half[0] == pytest.approx(-0.6 + PersonParams().palm_depth)
 
 
 def test_the_depth_of_boxes_is_that_by_which_one_must_move():

@@ -4,13 +4,15 @@ from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
+import pytest
 from support.scenarios.flyer_runs import kept, run
 
+from handover.cosim.blocks.geometry import rotation_of
 from handover.cosim.record.reader import Record
 from handover.plants.free_flyer.hand.hand_kinematics import PALM_BONES, PALM_RADIUS
 from handover.scenarios.free_flyer.handover.hand_practice import HandPractice, PracticeParameters
 from handover.scenarios.free_flyer.replay import replay_handover
-from handover.scenarios.free_flyer.scene import EDGE
+from handover.scenarios.free_flyer.scene import EDGE, robot_at
 
 
 def test_the_cube_is_in_view_wherever_it_flies_and_the_palm_is_drawn_where_it_touches():
@@ -25,6 +27,14 @@ def test_the_cube_is_in_view_wherever_it_flies_and_the_palm_is_drawn_where_it_to
     half = np.ptp(bones, axis=0) / 2.0
     away = np.maximum([np.abs(x) - half[0], np.abs(y) - half[1]], 0.0)
     np.testing.assert_allclose(np.linalg.norm(away, axis=0) ** 2 + z**2, PALM_RADIUS**2)
+
+
+def test_the_arm_is_drawn_from_the_cube_to_the_palm():
+    record = kept("flyer_robot_to_human").record
+    R_WB = rotation_of(record["robot.q_WB"][0])
+    _, arm, palm, *_ = ((s.corners - record["robot.p_WB"][0]) @ R_WB for s in robot_at(record, 0, 0.05))
+    assert arm[:, 0].max() == pytest.approx(-EDGE / 2.0)
+    assert arm[:, 0].min() == pytest.approx(palm[:, 0].mean())
 
 
 class Practised:
