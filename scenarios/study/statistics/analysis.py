@@ -282,9 +282,11 @@ class StudyAnalysis:
         slopes: list[float] = []
         for s in self.complete_sessions:
             own = [r for r in rows if r["participant"] == s.session.pseudonym and r["round"] > 1]
+            if not own:  # all that were played are void
+                continue
             x = [self._places(effect, s, r["round"]) for r in own]
             found = within_condition_slopes(x, [r["value"] for r in own], [(r["task"], r["behaviour"]) for r in own])
-            if own and found is not None:
+            if found is not None:
                 slopes.append(found[1 if effect == "carry-over" else 0])
         return OrderEffect(effect=effect, measure=measure, participants=len(slopes), test=signed_rank_test(slopes))
 

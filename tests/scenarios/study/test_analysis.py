@@ -157,3 +157,13 @@ def test_who_has_withdrawn_is_in_no_result(tmp_path: Path):
     assert {m.participant for m in analysis.means} == {"P01", "P02", "P04", "P05", "P06", "P07"}
     assert all(row["participant"] != "P03" for row in [*analysis.rounds, *analysis.answers])
     assert {e.participants for e in analysis.order_effects} == {6}
+
+
+def test_a_session_of_void_rounds_enters_no_effect_of_the_order(tmp_path: Path):
+    study = StudyFolder.opened(tmp_path / "out", PLAN)
+    folder = study.begin(session(1))
+    for planned in folder.rounds:
+        folder.record_round(planned.number, record(void=True))
+    folder.record_questionnaire({})
+    assert folder.is_complete
+    assert {effect.participants for effect in StudyAnalysis(study).order_effects} == {0}
