@@ -88,7 +88,7 @@ class GrowingRecord(Record):
 
     def metadata(self, signal: str) -> dict[bytes, bytes]:
         """Return unit, description and items of a signal, as in the record's schema."""
-        about = self._about[self._columns[signal][0]]
+        about = self._about[self._columns_of(signal)[0]]
         return {key.encode(): value.encode() for key, value in about.items()}
 
     def _metadata(self, signal: str) -> dict[bytes, bytes]:

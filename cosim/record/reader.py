@@ -139,7 +139,7 @@ class Record:
 
     def __contains__(self, signal: object) -> bool:
         """Return whether a signal of this name, or an entry of an array, was recorded."""
-        return signal in self._columns or signal in self._table.column_names
+        return signal in self._columns or any(signal in names for names in self._columns.values())
 
     def __getitem__(self, signal: str) -> NDArray[Any]:
         """Return a signal over time; an array port has its shape after the first axis, its entry `arm.p_WG[1]` none.
