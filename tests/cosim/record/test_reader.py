@@ -143,6 +143,9 @@ def test_the_newest_row_is_what_was_recorded_last(tmp_path: Path):
         assert growing.time.tolist() == [0.5]
         assert growing["unit.x"].tolist() == [[1.0, 2.0, 3.0]]
         assert growing["unit.n"].tolist() == [7]
+        assert "unit.x" in growing
+        assert "unit.x[3]" in growing
+        assert "unit.x[4]" not in growing
         assert not growing.refresh()
         x[:] = 4.0
         recorder(1.0, signals)

@@ -64,7 +64,7 @@ def test_list_prints_what_a_place_needs(here: Path):
 def test_a_controller_of_the_helix_with_two_inputs_and_one_output_is_judged_and_drawn(tmp_path: Path):
     printed = succeeded(tmp_path, "list", "helix_handover", "--unit", "servo")
     required = printed.split("Inputs, optional")[0]
-    assert "y of B is minus y of W" in " ".join(required.split())
+    assert "+y of B, which is -y of W" in " ".join(required.split())
     assert "dl_t  real[9] m" in required
     assert "closure" not in required.split("Outputs, required")[1]
     write_controller(tmp_path, "my_servo", PROPORTIONAL)

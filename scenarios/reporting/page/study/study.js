@@ -316,11 +316,11 @@
   byId("grasp").addEventListener("click", () => input?.grasp(!input.pose().closed));
   byId("views").addEventListener("click", () => { turnViews(); byId("pad").focus({preventScroll: true}); });
 
-  // Times from samples to pictures, which the server keeps with the round.
+  // Times from samples to pictures, which the server keeps with the round while it lasts: those of its last pictures are lost.
   function recordLatency(ms) {
     drawn.push(Math.round(100 * Math.max(0, ms)) / 100);
     root.dataset.drawn = Number(root.dataset.drawn ?? 0) + 1;
-    if (drawn.length >= 30) sendLatencies();
+    if (drawn.length >= 5) sendLatencies();
   }
   function sendLatencies() {
     if (drawn.length) send({drawn});
