@@ -4,11 +4,13 @@ Both are those that tests keep (`support.kept_runs`): made again only when code,
 """
 
 import json
+import re
 import shutil
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from urllib.parse import unquote
 
 from PIL import Image
 from support.commands import LOADED, forking
@@ -174,6 +176,7 @@ def gallery_run(name: str, files: Path) -> GalleryRun:
     page = f"gallery/{name}/report.html"
     for file in (f for f in run.iterdir() if f.is_file()):  # the page links them
         shutil.copyfile(file, files / f"gallery/{name}/{file.name}")
+    unlink_what_is_missing(files / page)
     summary = json.loads((run / "summary.json").read_text(encoding="utf-8"))
     headline = json.loads((run / "run.json").read_text(encoding="utf-8"))["headline"]
     metrics = {n: MetricRow(n, unit_symbol(m["unit"]), m["description"], format_metric(m))
@@ -181,6 +184,16 @@ def gallery_run(name: str, files: Path) -> GalleryRun:
     ordered = {n: metrics[n] for n in (*(n for n in headline if n in metrics), *metrics)}
     diagram = system_svg(handover.system(name))
     return GalleryRun(bool(summary["success"]), summary["reason"], figures, page, diagram, [*ordered.values()])
+
+
+def unlink_what_is_missing(page: Path) -> None:
+    """Keep of a page's links to files that do not lie beside it their text alone."""
+
+    def linked(found: re.Match[str]) -> str:
+        return found[0] if (page.parent / unquote(found[1])).exists() else found[2]
+
+    html = page.read_text(encoding="utf-8")
+    page.write_text(re.sub(r'<a href="([^":#]+)">(<code>[^<]*</code>)</a>', linked, html), encoding="utf-8")
 
 
 def kept_campaign(name: str) -> Path:

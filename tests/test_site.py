@@ -180,6 +180,15 @@ def test_a_sentence_says_how_many_runs_there_are():
     assert (one.split(";")[0], many.split(";")[0]) == ("Shown: 1 run of its 1,280", "Shown: 5 runs of its 1,280")
 
 
+def test_a_report_in_the_gallery_links_what_lies_beside_it_alone(tmp_path: Path):
+    page, (there, missing) = tmp_path / "report.html", ("run.json", "figures")
+    linked = '<td><a href="{0}"><code>{0}</code></a></td>'
+    page.write_text(linked.format(there) + linked.format(missing))
+    (tmp_path / there).touch()
+    maker("gallery").unlink_what_is_missing(page)
+    assert page.read_text() == linked.format(there) + "<td><code>figures</code></td>"
+
+
 def test_every_published_experiment_is_run_for_the_gallery():
     points = maker("gallery")._POINTS
     assert points.keys() == EXPERIMENTS.keys()

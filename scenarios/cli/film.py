@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, TextIO
 import click
 from rich.progress import BarColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from handover.cosim.exceptions import counted
 from handover.scenarios.campaign.folder import OF_NEITHER, CampaignFolder
 from handover.scenarios.cli.options import FiniteRange, check_new_file, refused_if_taken, trust_option
 from handover.scenarios.execution.errors import FilmFailed, UsageError, one_line_errors, require_extra
@@ -108,7 +109,7 @@ def film(
         settings = FilmSettings(size=size, pace=pace, fps=fps, view=view, dark=dark)
         with Interruption():
             frames = _film(run, path, None if no_plots else plots, settings, force=force)
-    click.echo(f"film: {path}, {frames} frames, {frames / fps:.1f} s at {fps:g} fps")
+    click.echo(f"film: {path}, {counted(frames, 'frame')}, {frames / fps:.1f} s at {fps:g} fps")
 
 
 def _run(folder: Path) -> RunFolder:
