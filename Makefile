@@ -75,7 +75,7 @@ wording: $(VENV)/.installed-test
 # The site, which opens offline: docs/build/html/index.html.
 docs: $(VENV)/.installed-docs
 	PYTHONPATH=tests $(BIN)/python docs/sources.py
-	$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going --builder html docs docs/build/html
+	$(BIN)/python -m sphinx --quiet --jobs auto --fail-on-warning --keep-going --builder html docs docs/build/html
 
 # The README's pictures; needs chromium, too.
 pictures: $(VENV)/.installed-test

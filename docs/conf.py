@@ -105,6 +105,11 @@ def keep_together(app: Sphinx, doctree: nodes.document, page: str) -> None:  # n
             text.parent.replace(text, nodes.Text(kept))
 
 
+def mix_pages(app: Sphinx, env: object, pages: list[str]) -> None:  # noqa: ARG001
+    """Let the tutorials, of which some run for minutes, be read by all processes: each takes pages in this order."""
+    pages.sort(key=lambda page: page.rpartition("/")[2])
+
+
 def check_links(app: Sphinx, failure: Exception | None) -> None:
     """Look whether each file that a built page links, loads or shows is there: Sphinx asks this of Markdown's alone.
 
@@ -112,8 +117,8 @@ def check_links(app: Sphinx, failure: Exception | None) -> None:
         ExtensionError: some are not; all are named.
     """
     folder = Path(app.outdir)
-    pages = [page for page in folder.rglob("*.html") if "gallery" not in page.relative_to(folder).parts]
-    linked = [(p, link) for p in pages for link in re.findall(r'(?:href|src)="([^":#?]+)["#?]', p.read_text("utf-8"))]
+    pages = {page: page.read_text("utf-8") for page in folder.rglob("*.html")}
+    linked = [(p, link) for p, html in pages.items() for link in re.findall(r'(?:href|src)="([^":#?]+)["#?]', html)]
     broken = [f"{p.relative_to(folder)}: {link}" for p, link in linked if not (p.parent / unquote(link)).exists()]
     if failure is None and broken:
         raise ExtensionError(f"files that are linked and are not there: {'; '.join(broken)}")
@@ -126,8 +131,8 @@ def check_sentences(app: Sphinx, failure: Exception | None) -> None:
         ExtensionError: there are some; all are named with their pages.
     """
     folder = Path(app.outdir)
-    pages = [page for page in folder.rglob("*.html") if "gallery" not in page.relative_to(folder).parts]
-    long = [f"{p.relative_to(folder)}: {s}" for p in pages for s in long_sentences(p.read_text("utf-8"))]
+    pages = {page.relative_to(folder): page.read_text("utf-8") for page in folder.rglob("*.html")}
+    long = [f"{page}: {sentence}" for page, html in pages.items() for sentence in long_sentences(html)]
     if failure is None and long:
         raise ExtensionError(f"sentences of more than {MOST_WORDS} words:\n" + "\n".join(long))
 
@@ -137,6 +142,7 @@ def setup(app: Sphinx) -> None:
     app.add_html_math_renderer("mathml", (show_inline, None), (show_block, None))
     app.connect("build-finished", check_links)
     app.connect("build-finished", check_sentences)
+    app.connect("env-before-read-docs", mix_pages)
     app.connect("doctree-resolved", keep_together)
     app.connect("sphinx-click-process-description", set_columns)
     app.connect("sphinx-click-process-options", set_defaults)

@@ -15,7 +15,7 @@ _NO_WORDS = re.compile(r"<(code|math|svg)\b.*?</\1>", re.DOTALL)
 _TAG = re.compile(r"<[^>]+>")
 _NUMBERED = re.compile(r"\b\d+ [a-z ]+(?:, \d+ [a-z ]+)+")
 """A list such as "0 none, 1 out of reach"."""
-_END = re.compile(r"(?<=[.!?])\s+(?=[A-Z\[(])")
+_END = re.compile(r"(?<=[.!?])\s+(?=[A-Z\[(]|[\w-]+: )")
 _WORD = re.compile(r"[\w'%./,-]*\w[\w'%/-]*")
 
 

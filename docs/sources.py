@@ -6,7 +6,8 @@ it is left as it is where neither the product, nor its packages, nor the makers 
 
 import hashlib
 import os
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from itertools import repeat
 from pathlib import Path
 
 DOCS = Path(__file__).parent
@@ -42,8 +43,11 @@ def main() -> None:
     for each in made:
         each.result()
     pictures.check()
-    runs = {name: gallery_run(name, BUILD / "files") for name in SCENARIOS}
-    declared_pages.write(DOCS, runs, {name: gallery_experiment(name, BUILD / "files") for name in EXPERIMENTS})
+    files = repeat(BUILD / "files")
+    with ProcessPoolExecutor(os.cpu_count()) as drawing:
+        runs = dict(zip(SCENARIOS, drawing.map(gallery_run, SCENARIOS, files), strict=True))
+        experiments = dict(zip(EXPERIMENTS, drawing.map(gallery_experiment, EXPERIMENTS, files), strict=True))
+    declared_pages.write(DOCS, runs, experiments)
     for page in ("commands", "python"):
         (DOCS / "reference" / f"{page}.md").touch()  # Sphinx makes them of the product
     stamp.write_text(key)

@@ -166,7 +166,8 @@ def test_a_sentence_that_is_too_long_is_found_where_code_equations_and_numbered_
     sentences = maker("sentences")
     words = " ".join(["word"] * (sentences.MOST_WORDS - 1))
     codes = 60 * "<code class='x'><span>f_G</span></code>, " + "<math><mi>x</mi></math>"
-    short = f"<p>{codes} {words}. Another {words}. Why: {', '.join(f'{i} reason of some kind' for i in range(20))}.</p>"
+    numbered = ", ".join(f"{i} reason of some kind" for i in range(20))
+    short = f"<p>{codes} {words}. Another {words}. lower-case: {words}. Why: {numbered}.</p>"
     assert sentences.long_sentences(f"<p>{words} {words}</p><article>{short}</article>") == []
     for tag in ("figcaption", "td", "li", "dd"):
         assert len(sentences.long_sentences(f"<article>{short}<{tag}>It is a {words}</{tag}></article>")) == 1

@@ -169,7 +169,7 @@ class HandoverParameters(RobotAndModel):
     )
     skill: Number = parameter(
         1.0,
-        "the person's skill. At 0, errors of sight, timing and effort are eight times as large and reactions take "
+        "the person's skill. At 0, errors of sight, timing and effort are eight times as large. Reactions take "
         "twice the time; the person does not wait for the gripper in three of ten attempts",
         minimum=0.0,
         maximum=1.0,
