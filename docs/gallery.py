@@ -17,9 +17,7 @@ from support.commands import LOADED, forking
 from support.in_process_pool import use_in_process_pool
 from support.kept_runs import kept_run
 
-import handover
 from handover.cosim.exceptions import counted
-from handover.cosim.system.graph import system_svg
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.display_unit import unit_symbol
 from handover.scenarios.experiment.experiment import Figure
@@ -31,6 +29,7 @@ from handover.scenarios.published.published_experiment import (
     draw_figures,
     verdict_counts,
 )
+from handover.scenarios.reporting.graph import drawing_of
 from handover.scenarios.reporting.run_figures import draw_record
 from handover.scenarios.results.run_facts import RunFacts, record_of
 from handover.scenarios.results.run_folder import RunFolder
@@ -178,11 +177,11 @@ def gallery_run(name: str, files: Path) -> GalleryRun:
         shutil.copyfile(file, files / f"gallery/{name}/{file.name}")
     unlink_what_is_missing(files / page)
     summary = json.loads((run / "summary.json").read_text(encoding="utf-8"))
-    headline = json.loads((run / "run.json").read_text(encoding="utf-8"))["headline"]
+    content = json.loads((run / "run.json").read_text(encoding="utf-8"))
     metrics = {n: MetricRow(n, unit_symbol(m["unit"]), m["description"], format_metric(m))
                for n, m in summary["metrics"].items()}  # fmt: skip
-    ordered = {n: metrics[n] for n in (*(n for n in headline if n in metrics), *metrics)}
-    diagram = system_svg(handover.system(name))
+    ordered = {n: metrics[n] for n in (*(n for n in content["headline"] if n in metrics), *metrics)}
+    diagram = drawing_of(content["system"])
     return GalleryRun(bool(summary["success"]), summary["reason"], figures, page, diagram, [*ordered.values()])
 
 

@@ -5,7 +5,8 @@ Few units stand around a circle, in the order in which signals flow; many by a f
 
 import html
 import itertools
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -13,7 +14,7 @@ import numpy as np
 from handover.cosim.blocks.ports import Floats
 
 if TYPE_CHECKING:
-    from handover.cosim.system.system import Connection, PlacedUnit, System
+    from handover.cosim.system.system import Connection, System
 
 Pair = tuple[str, str]
 """Names of the units that signals go from and to."""
@@ -78,78 +79,125 @@ def _near_each_other(units: Sequence[str], pairs: Collection[Pair]) -> dict[str,
 
 
 _COLOURS = ("#2f6db5", "#d1602b", "#3c8d53", "#8357a8", "#a37a10", "#4d5866", "#c2487f", "#1f8a94", "#7d5a3c")
+"""Of units, in turn, where a page has no colours `--c0` and on."""
 _WIDTH, _HEIGHT = 720, 400
-_BOX_WIDTH, _LINE_HEIGHT, _LETTER = 170, 15, 6.6
-"""Least width of a unit's box, height of a line of text in it, width of a letter, pixels."""
-_NAME, _DETAIL = ' font-weight="bold"', ""
-"""Attributes of the first line of text in a box, and of the others."""
-_BOX = np.array([_BOX_WIDTH + 12.0, 3.0 * _LINE_HEIGHT + 22.0])
-"""Room of a box, pixels; that of another does not begin within it."""
+_LEAST_WIDTH, _LINE_HEIGHT, _LETTER, _ICON = 120, 15, 6.6, 36
+"""Least width of a unit's box, height of a line of text in it, width of a letter, size of an icon, pixels."""
+_GAP = 26.0
+"""Least distance of two boxes, pixels: an arrow's head is seen between them."""
 _ROUNDS = 200
 """In which boxes are moved apart, at most."""
 _FEW = 12
 """Number of units up to which a box has room for more than the name."""
 
 
+@dataclass(frozen=True)
+class DrawnUnit:
+    """A unit in the picture of a system.
+
+    Attributes:
+        name: in the system.
+        details: further lines of text: in the box if there are few units, else in its tooltip.
+        icon: address of its icon, a square; "" without.
+    """
+
+    name: str
+    details: Sequence[str]
+    icon: str = ""
+
+
 def system_svg(system: "System") -> str:
     """Return a picture of a system: a box for each unit, a line for all signals from one to another, with tooltips."""
-    names = list(system.units)
     bundles: dict[Pair, list[Connection]] = {}
     for c in system.connections:
-        if c.source.unit != c.target.unit and {c.source.unit, c.target.unit} <= set(names):
+        if {c.source.unit, c.target.unit} <= set(system.units):
             bundles.setdefault((c.source.unit, c.target.unit), []).append(c)
-    width = max(_WIDTH, 90 * int(np.sqrt(len(names))))
-    height = 240 if len(names) <= 2 else _HEIGHT * width // _WIDTH
-    inner = np.array([width / 2 - _BOX_WIDTH * 0.65, height / 2 - 45])
-    at = {
-        name: np.array([width / 2, height / 2]) + p * np.array([1.0, -1.0]) * inner
-        for name, p in places(names, bundles).items()
-    }
-    _move_apart(at)
-    points = np.array(list(at.values()))
-    beyond = np.maximum(_BOX / 2.0 - points.min(axis=0), 0.0)
-    at = {name: p + beyond for name, p in at.items()}
-    width, height = (float(x) for x in np.maximum((width, height), points.max(axis=0) + beyond + _BOX / 2.0).round())
-    colour = {name: _COLOURS[k % len(_COLOURS)] for k, name in enumerate(names)}
-    lines = [
-        _arrow(bent(at[a], at[b]), colour[a], _connections_text(system, a, b, cs)) for (a, b), cs in bundles.items()
+    units = [
+        DrawnUnit(name, (u.description.name, f"FMI {u.description.fmi}, {rate(float(u.period), sampled=u.sampled)}"))
+        for name, u in system.units.items()
     ]
-    boxes = [
-        _box(unit, at[unit.name], colour[unit.name], detailed=len(names) <= _FEW) for unit in system.units.values()
-    ]
+    return graph_svg(units, {pair: [_signal_text(system, c) for c in cs] for pair, cs in bundles.items()})
+
+
+def rate(period: float | None, *, sampled: bool) -> str:
+    """Return a unit's step as text, such as "33.3 ms, sampled"; None for steps that vary."""
+    text = "steps vary" if period is None else f"{period:.3g} s" if period >= 1.0 else f"{1000.0 * period:.3g} ms"
+    return text + (", sampled" if sampled else "")
+
+
+def graph_svg(units: Sequence[DrawnUnit], signals: Mapping[Pair, Sequence[str]]) -> str:
+    """Return a picture of units and of the signals between them, in the page's colours if it has any.
+
+    Args:
+        units: in the system's order.
+        signals: texts of the signals by the units that they go from and to; those from a unit to itself are not drawn.
+    """
+    names = [unit.name for unit in units]
+    between = {pair: texts for pair, texts in signals.items() if pair[0] != pair[1]}
+    texts = {u.name: [u.name, *(u.details if len(units) <= _FEW else ())] for u in units}
+    boxes = {u.name: _box_size(texts[u.name], u.icon) for u in units}
+    largest = np.max(list(boxes.values()), axis=0)
+    width = max(_WIDTH, 2.5 * np.sqrt(len(names) * np.prod(largest)))
+    height = largest[1] + 180 if len(names) <= 2 else _HEIGHT * width / _WIDTH
+    inner = np.array([width, height]) / 2 - 0.6 * largest
+    at = {name: np.array([1.0, -1.0]) * p * inner for name, p in places(names, between).items()}
+    _move_apart(at, boxes)
+    curves = {(a, b): bent(at[a], at[b]) for a, b in between}
+    corners = [at[name] + sign * boxes[name] / 2 for name in names for sign in (-1, 1)]
+    drawn = np.vstack([*corners, *curves.values()])
+    low = drawn.min(axis=0) - _GAP
+    width, height = (drawn.max(axis=0) + _GAP - low).round()
+    at, curves = {n: p - low for n, p in at.items()}, {pair: points - low for pair, points in curves.items()}
+    colour = {name: f"var(--c{k}, {_COLOURS[k]})" for name, k in zip(names, itertools.cycle(range(9)), strict=False)}
+    heads = {pair: _head(points, at, boxes) for pair, points in curves.items()}
+    titles = {(a, b): "\n".join([f"{a} \N{RIGHTWARDS ARROW} {b}", *of]) for (a, b), of in between.items()}
+    lines = [_arrow(curves[pair], heads[pair], colour[pair[0]], titles[pair]) for pair in between]
+    shown = [_box(u, texts[u.name], at[u.name], boxes[u.name], colour[u.name]) for u in units]
+    label = "; ".join(f"{a} to {b}: {', '.join(listed)}" for (a, b), listed in signals.items())
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:g} {height:g}" width="{width:g}" role="img" '
-        f'aria-label="graph of {len(names)} units" style="max-width: 100%; background: #fff; font: 12px sans-serif">'
-        f"{''.join(lines)}{''.join(boxes)}</svg>"
+        f'aria-label="{html.escape(f"graph of {len(names)} units. {label}")}" '
+        f'style="background: var(--page, #fff); font: 12px sans-serif">'
+        f"{''.join(lines)}{''.join(shown)}</svg>"
     )
 
 
-def _move_apart(at: dict[str, Floats]) -> None:
+def _box_size(lines: Sequence[str], icon: str) -> Floats:
+    width = max(_LEAST_WIDTH, max(map(len, lines)) * _LETTER + 16)
+    return np.array([width, _LINE_HEIGHT * len(lines) + 10.0 + (_ICON + 4.0 if icon else 0.0)])
+
+
+def _move_apart(at: dict[str, Floats], boxes: Mapping[str, Floats]) -> None:
     """Move the middles of boxes until no box covers another: of two, each half the shorter way apart."""
     for _ in range(_ROUNDS):
-        overlapping = [(a, b) for a, b in itertools.combinations(at, 2) if np.all(np.abs(at[b] - at[a]) < _BOX)]
-        if not overlapping:
+        moved = False
+        for a, b in itertools.combinations(at, 2):
+            over = (boxes[a] + boxes[b]) / 2 + _GAP - np.abs(at[b] - at[a])
+            if np.all(over > 0.0):
+                push = np.where(over == over.min(), 0.51 * over, 0.0) * np.where(at[b] >= at[a], 1.0, -1.0)
+                at[a], at[b] = at[a] - push, at[b] + push
+                moved = True
+        if not moved:
             return
-        for a, b in overlapping:
-            over = _BOX - np.abs(at[b] - at[a])
-            along = over == over.min()
-            push = np.where(along, 0.51 * over, 0.0) * np.where(at[b] >= at[a], 1.0, -1.0)
-            at[a], at[b] = at[a] - push, at[b] + push
 
 
-def _connections_text(system: "System", source: str, target: str, connections: "Sequence[Connection]") -> str:
-    outputs = system.units[source].description.outputs
-    lines = [f"{source} → {target}"]
-    for c in connections:
-        port = c.source.port if c.source.port == c.target.port else f"{c.source.port} → {c.target.port}"
-        lines.append(f"{port} ({outputs[c.source.port].signature})" if c.source.port in outputs else port)
-    return "\n".join(lines)
+def _signal_text(system: "System", c: "Connection") -> str:
+    outputs = system.units[c.source.unit].description.outputs
+    port = c.source.port if c.source.port == c.target.port else f"{c.source.port} \N{RIGHTWARDS ARROW} {c.target.port}"
+    return f"{port} ({outputs[c.source.port].signature})" if c.source.port in outputs else port
 
 
-def _arrow(points: Floats, colour: str, title: str) -> str:
+def _head(points: Floats, at: Mapping[str, Floats], boxes: Mapping[str, Floats]) -> int:
+    """Return the index of the point nearest a line's middle that no box covers; that of the middle if all are."""
+    covered = [np.all(np.abs(points - at[name]) < boxes[name] / 2 + 7.0, axis=1) for name in at]
+    free = np.flatnonzero(~np.any(covered, axis=0))
+    middle = len(points) // 2
+    return int(min(free, key=lambda k: abs(k - middle))) if len(free) else middle
+
+
+def _arrow(points: Floats, head: int, colour: str, title: str) -> str:
     path = " ".join(f"{x:.1f},{y:.1f}" for x, y in points.tolist())
-    middle = points[len(points) // 2]
-    along = points[len(points) // 2 + 1] - middle
+    middle, along = points[head], points[min(head + 1, len(points) - 1)] - points[max(head - 1, 0)]
     angle = float(np.degrees(np.arctan2(along[1], along[0])))
     place = f"translate({middle[0]:.1f} {middle[1]:.1f}) rotate({angle:.1f})"
     return (
@@ -158,22 +206,17 @@ def _arrow(points: Floats, colour: str, title: str) -> str:
     )
 
 
-def _box(unit: "PlacedUnit", at: Floats, colour: str, *, detailed: bool) -> str:
-    d, period = unit.description, float(unit.period)
-    rate = f"{period:.3g} s" if period >= 1.0 else f"{1000.0 * period:.3g} ms"
-    details = [d.name, f"FMI {d.fmi}, {rate}{', sampled' if unit.sampled else ''}"]
-    lines = [unit.name, *(details if detailed else ())]
-    width, height = max(len(line) for line in lines) * _LETTER + 16, _LINE_HEIGHT * len(lines) + 10
-    x, y = float(at[0]), float(at[1])
+def _box(unit: DrawnUnit, lines: Sequence[str], at: Floats, size: Floats, colour: str) -> str:
+    (x, y), (width, height) = (at - size / 2).tolist(), size.tolist()
+    first = y + 5.0 + (_ICON + 4.0 if unit.icon else 0.0)
     texts = "".join(
-        f'<tspan x="{x:.1f}" y="{y - height / 2 + _LINE_HEIGHT * (k + 1):.1f}"'
-        f"{_NAME if k == 0 else _DETAIL}>{html.escape(line)}</tspan>"
-        for k, line in enumerate(lines)
+        f'<tspan x="{at[0]:.1f}" y="{first + _LINE_HEIGHT * (k + 0.75):.1f}"{bold}>{html.escape(line)}</tspan>'
+        for k, (line, bold) in enumerate(zip(lines, [' font-weight="bold"', *[""] * len(lines)], strict=False))
     )
-    title = html.escape("\n".join([unit.name, *details]))
+    icon = f'<image href="{html.escape(unit.icon)}" x="{at[0] - _ICON / 2:.1f}" y="{y + 5:.1f}" width="{_ICON}"/>'
     return (
-        f"<g><title>{title}</title>"
-        f'<rect x="{x - width / 2:.1f}" y="{y - height / 2:.1f}" width="{width:.1f}" height="{height}" rx="4" '
-        f'fill="#fff" stroke="{colour}" stroke-width="2"/>'
-        f'<text text-anchor="middle" fill="#1f2933">{texts}</text></g>'
+        f"<g><title>{html.escape(chr(10).join([unit.name, *unit.details]))}</title>"
+        f'<rect x="{x:.1f}" y="{y:.1f}" width="{width:.1f}" height="{height:.1f}" rx="4" '
+        f'fill="var(--card, #fff)" stroke="{colour}" stroke-width="2"/>{icon if unit.icon else ""}'
+        f'<text text-anchor="middle" fill="var(--ink, #1f2933)">{texts}</text></g>'
     )
