@@ -105,9 +105,14 @@ def keep_together(app: Sphinx, doctree: nodes.document, page: str) -> None:  # n
             text.parent.replace(text, nodes.Text(kept))
 
 
+_PARTS = 6
+"""Into which Sphinx divides the site's pages, for its processes to read one after another."""
+
+
 def mix_pages(app: Sphinx, env: object, pages: list[str]) -> None:  # noqa: ARG001
-    """Let the tutorials, of which some run for minutes, be read by all processes: each takes pages in this order."""
-    pages.sort(key=lambda page: page.rpartition("/")[2])
+    """Put tutorials, of which some run for minutes, into different parts of the pages that are to be read."""
+    first = sorted(pages, key=lambda page: not page.startswith("tutorials/"))
+    pages[:] = [page for k in range(_PARTS) for page in first[k::_PARTS]]
 
 
 def check_links(app: Sphinx, failure: Exception | None) -> None:
