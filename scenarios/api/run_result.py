@@ -57,7 +57,7 @@ class Quantity(float):
 
 
 class Metrics(dict[str, Quantity]):
-    """Figures of merit by name; the error for an unknown one has the nearest names."""
+    """Metrics by name; the error for an unknown one has the nearest names."""
 
     def __missing__(self, name: str) -> Quantity:
         """Raise KeyError."""
@@ -127,7 +127,7 @@ class Run:
 
     @functools.cached_property
     def metrics(self) -> "Metrics":
-        """Figures of merit by name, the headline's first, as numbers with `unit` and `description`; maybe NaN."""
+        """Metrics by name, the headline's first, as numbers with `unit` and `description`; maybe NaN."""
         found: Mapping[str, Any] = self._facts.summary["metrics"]
         first = [name for name in self._facts.headline if name in found]
         ordered = {name: found[name] for name in dict.fromkeys([*first, *found])}

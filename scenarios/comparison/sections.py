@@ -98,11 +98,11 @@ def metrics_section(entries: Sequence[RunEntry], rows: Sequence[MetricRow]) -> S
     for row in rows:
         unit = display_unit(row.unit, list(row.values.values()))
         shown.append((row.description, *(Cell(unit.text(row.values[e.name]), row.values[e.name]) for e in entries)))
-    header = ("figure", *(e.name for e in entries))
+    header = ("metric", *(e.name for e in entries))
     html = rows_table(header, shown, numbers=range(1, len(header)))
     note = "One run each does not show by how much they vary; campaigns do."
     html += Markup("<p class='soft'>{}</p>").format(note)
-    return Section(anchor="metrics", title="Figures of the runs", html=html)
+    return Section(anchor="metrics", title="Metrics of the runs", html=html)
 
 
 def tests_section(results: ComparedCampaigns) -> Section | None:

@@ -175,7 +175,7 @@ _IN_TABLES = ("cpu_", "pace_", "iterations", "rollbacks")
 """Beginnings of the names of metrics that other sections show."""
 
 _FILES = {
-    "summary.json": "verdict and figures of the run",
+    "summary.json": "verdict and metrics of the run",
     "signals.parquet": "all signals over time, with units",
     "run.json": "configuration, versions and hashes",
     "checkpoint.zip": "the last checkpoint, to resume from",
@@ -190,7 +190,7 @@ def metrics_section(facts: RunFacts) -> Section | None:
     first = [n for n in facts.headline if n in metrics]
     others = [n for n in metrics if n not in first and not n.startswith(_IN_TABLES)]
     rows = [(metrics[n].get("description") or n, format_metric(metrics[n]), n) for n in first + others]
-    return _table("figures", "Figures of the run", rows, first=len(first))
+    return _table("figures", "Metrics", rows, first=len(first))
 
 
 def parameters_section(facts: RunFacts) -> Section | None:
@@ -256,8 +256,8 @@ def published_section(facts: RunFacts) -> Section | None:
     rows = [_published_row(v, metrics[v.metric]) for v in _published_values(facts) if v.metric in metrics]
     if not rows:
         return None
-    note = "One run does not test what was published: it does not show how its figures vary."
-    html = rows_table(("figure", "this run", "published", "where"), rows, numbers=(1, 2), cards=True)
+    note = "One run does not test what was published: it does not show how they vary."
+    html = rows_table(("metric", "this run", "published", "where"), rows, numbers=(1, 2), cards=True)
     return Section(
         anchor="published", title="Published values", html=html + Markup("<p class='soft'>{}</p>").format(note)
     )
