@@ -2,7 +2,6 @@
 
 import asyncio
 import contextlib
-import signal
 import socket
 import sys
 from collections.abc import Mapping, Sequence
@@ -22,7 +21,7 @@ from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.results.run_folder import RunFolder, dated_folder
 
 if TYPE_CHECKING:
-    from handover.scenarios.live.play_page import PlayPage, Session
+    from handover.scenarios.live.play_page import Session
 
 _HELP = """Play with the parameters of a SCENARIO in a browser, which shows its runs while they go on.
 
@@ -124,18 +123,11 @@ async def _serve(session: "Session") -> None:
     from handover.scenarios.live.play_page import PlayPage
     from handover.scenarios.live.process import HOST
     from handover.scenarios.live.server import serve
+    from handover.scenarios.live.serving import ended_by_signals
 
     page = PlayPage(session)
-    with socket.create_server((HOST, 0)) as listening:
-        _end_by_signals(page)
+    with socket.create_server((HOST, 0)) as listening, ended_by_signals(page.end):
         say(f"play: http://{HOST}:{listening.getsockname()[1]}/  (Ctrl-C ends the session)")
         await serve(page, page.work(), listening)
     runs = counted(page.runs, "run")
     say(f"{runs} in {session.folder}" if page.runs else "no run was begun")
-
-
-def _end_by_signals(page: "PlayPage") -> None:
-    loop = asyncio.get_running_loop()
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        if signal.getsignal(number) is not signal.SIG_IGN:
-            loop.add_signal_handler(number, page.end)

@@ -4,39 +4,28 @@ Requests need a loopback Host header; WebSockets also need an Origin equal to Ho
 """
 
 import asyncio
-import contextlib
 import shutil
 import socket
 import threading
-from collections.abc import Coroutine, Generator
+from collections.abc import Coroutine
 from pathlib import Path
 from typing import Any
 
-import uvicorn
 from starlette.applications import Starlette
 from starlette.middleware import Middleware
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.routing import Route, WebSocketRoute
 
 from handover.cosim.master.live_control import LiveControl
-from handover.scenarios.live.connections import BACKLOG, BoundedConnection
 from handover.scenarios.live.live_page import LivePage
 from handover.scenarios.live.process import CONTROL_FILE, HOST, wait_for_end_of_input
+from handover.scenarios.live.serving import PageServer
 from handover.scenarios.live.shown_run import ShownRun
 from handover.scenarios.live.watched_run import WatchedRun
 from handover.scenarios.live.webcam import WebcamFiles
 
 _GRACE = 3
 """Time for pages to take in that the server ends, s; a browser that is frozen never does."""
-
-
-class _Server(uvicorn.Server):
-    """A server that leaves signals to the run, or to the session: Ctrl-C ends that, and this with it."""
-
-    @contextlib.contextmanager
-    def capture_signals(self) -> Generator[None, None, None]:
-        """Handle none."""
-        yield
 
 
 async def serve(page: LivePage, work: Coroutine[Any, Any, None], listening: socket.socket) -> None:
@@ -57,20 +46,10 @@ async def serve(page: LivePage, work: Coroutine[Any, Any, None], listening: sock
         ],
         middleware=[Middleware(TrustedHostMiddleware, allowed_hosts=[HOST, "localhost"])],
     )
-    config = uvicorn.Config(
-        application,
-        log_level="error",
-        http=BoundedConnection,
-        backlog=BACKLOG,
-        ws="websockets-sansio",
-        ws_max_size=4 * page.longest,
-        lifespan="off",
-        timeout_graceful_shutdown=_GRACE,
-    )
-    server = _Server(config)
+    server = PageServer(application, page.longest, _GRACE)
     serving = asyncio.create_task(server.serve(sockets=[listening]))
     await asyncio.wait([job, serving], return_when=asyncio.FIRST_COMPLETED)
-    server.should_exit = True
+    server.end()
     await serving
     await job
 

@@ -6,9 +6,9 @@ import socket
 from collections.abc import Callable
 from pathlib import Path
 
-import uvicorn
 from websockets.exceptions import ConnectionClosed
 
+from handover.scenarios.live.serving import PageServer, ended_by_signals
 from handover.scenarios.live.webcam import WebcamFiles
 from handover.scenarios.study.folder.session_folder import RoundRecord, pseudonym_of
 from handover.scenarios.study.folder.study_folder import StudyFolder
@@ -18,7 +18,7 @@ from handover.scenarios.study.plan.plan import TRACKER, WEBCAM, StudyPlan
 from handover.scenarios.study.session.pilot import PilotRefused, play_sessions
 from handover.scenarios.study.session.protocol import Protocol
 from handover.scenarios.study.session.seat import StudySeat
-from handover.scenarios.study.session.server import StudyServer, listening_socket, uvicorn_server
+from handover.scenarios.study.session.server import StudyServer, listening_socket, page_server
 
 
 class NotServed(RuntimeError):
@@ -74,10 +74,10 @@ async def serve_study(
     with listening, (study := StudyFolder.opened(out, plan)).held():
         seat = StudySeat(Protocol(study, devices, number), pace, {} if webcam is None else webcam.hashes())
         server = StudyServer(seat, host, webcam, photodiode=photodiode)
-        serving = uvicorn_server(server)
+        serving = page_server(server)
         seat.on_round_end = lambda planned, ended: tell(line_of_round(plan, seat.protocol.number, planned, ended))
         address = address_of(listening, server)
-        with serving.capture_signals():  # before anybody is told that Ctrl-C ends it
+        with ended_by_signals(serving.end):  # before anybody reads that Ctrl-C ends it
             tell(f"study: {address}  (results in {out}; Ctrl-C ends it)")
             if TRACKER in plan.devices:
                 tell(f"a hand tracker connects to {address.replace('http', 'ws', 1)}hand")
@@ -88,7 +88,7 @@ async def serve_study(
 
 
 async def _with_pilots(
-    serving: uvicorn.Server, server: StudyServer, listening: socket.socket, address: str, tell: Callable[[str], None]
+    serving: PageServer, server: StudyServer, listening: socket.socket, address: str, tell: Callable[[str], None]
 ) -> None:
     job = asyncio.create_task(serving.serve(sockets=[listening]))
     playing = asyncio.create_task(play_sessions(address, server.seat.protocol.study.plan, tell))
@@ -103,7 +103,7 @@ async def _with_pilots(
         playing.cancel()
         with contextlib.suppress(asyncio.CancelledError, Exception):
             await playing
-        serving.should_exit = True
+        serving.end()
         await job
 
 

@@ -4,17 +4,14 @@ On loopback, pages of other sites are kept away by the host that is asked for an
 another address the page is below a token that only its own address holds.
 """
 
-import asyncio
 import contextlib
 import secrets
-import signal
 import socket
-from collections.abc import AsyncGenerator, Generator
+from collections.abc import AsyncGenerator
 from importlib import resources
 from typing import Any
 
 import tomli
-import uvicorn
 from starlette.applications import Starlette
 from starlette.middleware import Middleware
 from starlette.middleware.trustedhost import TrustedHostMiddleware
@@ -23,7 +20,8 @@ from starlette.responses import HTMLResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
-from handover.scenarios.live.connections import BACKLOG, HEADERS, POLICY_VIOLATION, BoundedConnection, is_same_origin
+from handover.scenarios.live.connections import HEADERS, POLICY_VIOLATION, is_same_origin
+from handover.scenarios.live.serving import PageServer
 from handover.scenarios.live.webcam import WEBCAM_SCRIPTS, WebcamFiles
 from handover.scenarios.reporting.html import json_html
 from handover.scenarios.reporting.page import asset, plain_page_html, template
@@ -138,39 +136,6 @@ def listening_socket(host: str, port: int) -> socket.socket:
     return socket.create_server((host, port), family=family)
 
 
-class _Server(uvicorn.Server):
-    """A server that ends at Ctrl-C and SIGTERM, and lets the command go on."""
-
-    @contextlib.contextmanager
-    def capture_signals(self) -> Generator[None, None, None]:
-        """Let both end it in order."""
-        loop = asyncio.get_running_loop()
-        for number in (signal.SIGINT, signal.SIGTERM):
-            loop.add_signal_handler(number, self._end)
-        try:
-            yield
-        finally:
-            for number in (signal.SIGINT, signal.SIGTERM):
-                loop.remove_signal_handler(number)
-
-    def _end(self) -> None:
-        self.should_exit = True
-
-
-def uvicorn_config(server: StudyServer) -> uvicorn.Config:
-    """Return how a study's page is served."""
-    return uvicorn.Config(
-        server.application(),
-        log_level="error",
-        http=BoundedConnection,
-        backlog=BACKLOG,
-        ws="websockets-sansio",
-        ws_max_size=4 * LONGEST,
-        server_header=False,
-        timeout_graceful_shutdown=_GRACE,
-    )
-
-
-def uvicorn_server(server: StudyServer) -> uvicorn.Server:
-    """Return what serves a study's page on a socket, by `serve(sockets=[...])`, until Ctrl-C or SIGTERM."""
-    return _Server(uvicorn_config(server))
+def page_server(server: StudyServer) -> PageServer:
+    """Return what serves a study's page on a socket, by `serve(sockets=[...])`."""
+    return PageServer(server.application(), LONGEST, _GRACE)

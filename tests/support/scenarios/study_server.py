@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import uvicorn
 from websockets.sync.client import ClientConnection, connect
 
 from handover.scenarios.live.hand_messages import HandStream, hand_sample
@@ -25,7 +24,7 @@ from handover.scenarios.study.session import seat as seat_module
 from handover.scenarios.study.session.latency import LatencyLog
 from handover.scenarios.study.session.protocol import Protocol
 from handover.scenarios.study.session.seat import StudySeat
-from handover.scenarios.study.session.server import StudyServer, uvicorn_config
+from handover.scenarios.study.session.server import StudyServer, page_server
 from handover.scenarios.study.session.trial import Frame, TrialRequest
 
 HOST = "127.0.0.1"
@@ -85,7 +84,7 @@ def without_runs(monkeypatch: pytest.MonkeyPatch) -> None:
 @contextmanager
 def served(server: StudyServer) -> Generator[str, None, None]:
     """Serve a study in a thread; yield host and port. A run under way ends with it."""
-    running = uvicorn.Server(uvicorn_config(server))
+    running = page_server(server)
     with socket.create_server((HOST, 0)) as listening:
         thread = threading.Thread(target=running.run, kwargs={"sockets": [listening]})
         thread.start()
