@@ -147,7 +147,7 @@ class SessionFolder:
             InvalidRunFolder: its file is damaged.
         """
         file = self._file(number)
-        return read_file(file, f"it has no {file.name}", _KeptRound) if file.exists() else None
+        return read_file(file, f"it has no {file.name}", _KeptRound) if file.is_file() else None
 
     @property
     def records(self) -> dict[int, RoundRecord]:
@@ -187,7 +187,7 @@ class SessionFolder:
     @property
     def next_round(self) -> Round | None:
         """The round to be played next; None if all have been."""
-        return next((r for r in self.rounds if not self._file(r.number).exists()), None)
+        return next((r for r in self.rounds if not self._file(r.number).is_file()), None)
 
     @property
     def unrated_round(self) -> Round | None:
@@ -221,7 +221,7 @@ class SessionFolder:
 
     def is_broken_off(self, number: int) -> bool:
         """Return whether a round has been begun and not finished."""
-        return self._begun(number).is_file() and not self._file(number).exists()
+        return self._begun(number).is_file() and not self._file(number).is_file()
 
     def _begun(self, number: int) -> Path:
         return self._file(number).with_suffix(".begun")
@@ -233,7 +233,7 @@ class SessionFolder:
             RecordNotWritten: it cannot be renamed.
         """
         folder = self.run_folder(number)
-        if self._file(number).exists() or not folder.exists():
+        if self._file(number).is_file() or not folder.exists():
             return None
         k = 1
         while (aside := folder.with_name(f"{folder.name}_unfinished_{k}")).exists():

@@ -209,18 +209,6 @@ def test_answers_that_the_plan_does_not_allow_are_in_no_table(file: str, entries
     assert study.withdraw(1, "2026-11-30", delete=True).deleted
 
 
-def test_what_is_no_file_in_a_rounds_place_is_refused_and_the_round_is_not_played_again(tmp_path: Path):
-    folder = StudyFolder.opened(tmp_path / "out", PLAN).begin(session(1))
-    folder.record_round(1, record())
-    (folder.path / "rounds" / "01.json").unlink()
-    (folder.path / "rounds" / "01.json").mkdir()
-    with pytest.raises(InvalidRunFolder) as refused:
-        folder.records  # noqa: B018
-    assert "01.json" in str(refused.value)
-    assert folder.next_round is not None
-    assert folder.next_round.number == 2
-
-
 def test_no_session_begins_in_a_folder_that_was_removed_meanwhile(tmp_path: Path):
     study = StudyFolder.opened(tmp_path / "out", PLAN)
     shutil.rmtree(study.path)
