@@ -1,4 +1,4 @@
-"""Make `scenarios/reporting/page/scene/three.min.js` anew: the parts of three.js that our scripts use, in one file.
+"""Make `scenarios/runs/reporting/page/scene/three.min.js`: the parts of three.js that our scripts use.
 
 Needs npm. The version is pinned below; the licence is copied beside the file.
 
@@ -12,7 +12,7 @@ import tempfile
 from pathlib import Path
 
 THREE, ESBUILD = "0.187.0", "0.28.1"
-PAGE = Path(__file__).parents[1] / "scenarios" / "reporting" / "page"
+PAGE = Path(__file__).parents[1] / "scenarios" / "runs" / "reporting" / "page"
 SCRIPTS = ("scene/scene_objects.js", "scene/scene.js", "hand/hand_input.js")
 ADDONS = {
     "OrbitControls": "controls/OrbitControls.js",

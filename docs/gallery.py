@@ -18,7 +18,6 @@ from support.in_process_pool import use_in_process_pool
 from support.kept_runs import kept_run
 
 from handover.cosim.exceptions import counted
-from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.display_unit import unit_symbol
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.published.catalog import EXPERIMENTS
@@ -29,17 +28,18 @@ from handover.scenarios.published.published_experiment import (
     draw_figures,
     verdict_counts,
 )
-from handover.scenarios.reporting.graph import drawing_of
-from handover.scenarios.reporting.run_figures import draw_record
-from handover.scenarios.results.run_facts import RunFacts, record_of
-from handover.scenarios.results.run_folder import RunFolder
-from handover.scenarios.results.tables import format_metric
-from handover.scenarios.results.tolerated_faults import ToleratedFaults
+from handover.scenarios.runs.campaign.table import CampaignTable
+from handover.scenarios.runs.reporting.graph import drawing_of
+from handover.scenarios.runs.reporting.run_figures import draw_record
+from handover.scenarios.runs.results.run_facts import RunFacts, record_of
+from handover.scenarios.runs.results.run_folder import RunFolder
+from handover.scenarios.runs.results.tables import format_metric
+from handover.scenarios.runs.results.tolerated_faults import ToleratedFaults
 
 _FIRST = ("scene", "pictures", "shape", "hand", "path", "error", "motion")
 """Names of figures that show most of a scenario, best first."""
 
-_OF_CAMPAIGNS = ("cli.paper", "cli.campaign", "published.catalog", "campaign.run_job", "experiment.plotting")
+_OF_CAMPAIGNS = ("cli.paper", "cli.campaign", "published.catalog", "runs.campaign.run_job", "experiment.plotting")
 """Modules that campaigns need besides."""
 
 _POINTS: Mapping[str, Sequence[int]] = {

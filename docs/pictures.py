@@ -91,7 +91,7 @@ def _sources(name: str) -> dict[str, Any]:
         plan, source = PUBLISHED[source]().plan(quick=False), PUBLISHED[source].scenario
         sources["plan"] = _digest(repr((plan.points, plan.fixed, plan.repetitions, plan.seed)).encode())
     if name in _LOOKS:
-        pages = DOCS.parent / "scenarios" / "reporting" / "page"
+        pages = DOCS.parent / "scenarios" / "runs" / "reporting" / "page"
         sources["look"] = _digest(b"".join(f.read_bytes() for p in _LOOKS[name] for f in sorted(pages.glob(p))))
     metrics = json.loads((kept_run("run", source) / "summary.json").read_text(encoding="utf-8"))["metrics"]
     costs = ("cpu_", "pace_", "peak_memory")

@@ -30,13 +30,13 @@ if TYPE_CHECKING:
     from handover.scenarios.api.session import SavedState, Session, open  # noqa: A004
     from handover.scenarios.api.signals import SignalTable
     from handover.scenarios.api.sweeping import sweep
-    from handover.scenarios.execution.errors import ClusterLost
+    from handover.scenarios.runs.execution.errors import ClusterLost
 
 _EXPORTS = {
     "AdaptiveStep": "cosim.stepping.options",
     "Algorithm": "cosim.stepping.options",
     "Campaign": "scenarios.api.campaign_result",
-    "ClusterLost": "scenarios.execution.errors",
+    "ClusterLost": "scenarios.runs.execution.errors",
     "Extrapolation": "cosim.stepping.options",
     "FmuDescription": "cosim.fmu.file.description",
     "InvalidInput": "scenarios.api.arguments",

@@ -74,19 +74,19 @@ SYSTEMS = (
         "helix",
         {
             "helix_handover": ScenarioEntry(
-                "handover.scenarios.helix.helix_handover:HelixHandover",
+                "handover.scenarios.robots.helix.helix_handover:HelixHandover",
                 "the Helix takes a ball from a hand by visual servoing",
             ),
             "helix_reach": ScenarioEntry(
-                "handover.scenarios.helix.helix_reach:HelixReach",
+                "handover.scenarios.robots.helix.helix_reach:HelixReach",
                 "how far the Helix reaches, with exact measurements instead of cameras",
             ),
             "helix_reflex_grasp": ScenarioEntry(
-                "handover.scenarios.helix.helix_reflex_grasp:HelixReflexGrasp",
+                "handover.scenarios.robots.helix.helix_reflex_grasp:HelixReflexGrasp",
                 "the Helix comes to a ball by its cameras and centres its gripper by infrared fingers",
             ),
             "helix_use_case": ScenarioEntry(
-                "handover.scenarios.helix.helix_use_case:HelixUseCase",
+                "handover.scenarios.robots.helix.helix_use_case:HelixUseCase",
                 "the Helix takes a ball from a hand and drops it into a bowl",
             ),
         },
@@ -96,15 +96,15 @@ SYSTEMS = (
         "vsl",
         {
             "vsl_model_based": ScenarioEntry(
-                "handover.scenarios.vsl.path_experiments:VslModelBased",
+                "handover.scenarios.robots.vsl.path_experiments:VslModelBased",
                 "an arm of soft links follows a path by rigid-link kinematics",
             ),
             "vsl_hybrid": ScenarioEntry(
-                "handover.scenarios.vsl.path_experiments:VslHybrid",
+                "handover.scenarios.robots.vsl.path_experiments:VslHybrid",
                 "an arm of soft links follows a path by kinematics with learned corrections",
             ),
             "vsl_pick_and_place": ScenarioEntry(
-                "handover.scenarios.vsl.pick_and_place:VslPickAndPlace",
+                "handover.scenarios.robots.vsl.pick_and_place:VslPickAndPlace",
                 "an arm of soft links picks an object up softly and carries it stiffly",
             ),
         },
@@ -114,35 +114,35 @@ SYSTEMS = (
         "free_flyer",
         {
             "flyer_impedance": ScenarioEntry(
-                "handover.scenarios.free_flyer.push.impedance:FlyerImpedance",
+                "handover.scenarios.robots.free_flyer.push.impedance:FlyerImpedance",
                 "a free-flyer yields to a push against its gripper and comes back",
             ),
             "flyer_arm_impedance": ScenarioEntry(
-                "handover.scenarios.free_flyer.push.arm_impedance:FlyerArmImpedance",
+                "handover.scenarios.robots.free_flyer.push.arm_impedance:FlyerArmImpedance",
                 "a free-flyer yields to a push against its gripper with base and arm",
             ),
             "flyer_robot_to_human": ScenarioEntry(
-                "handover.scenarios.free_flyer.handover.handovers:RobotToHuman",
+                "handover.scenarios.robots.free_flyer.handover.handovers:RobotToHuman",
                 "a free-flyer fetches an object and gives it to a person",
             ),
             "flyer_human_to_robot": ScenarioEntry(
-                "handover.scenarios.free_flyer.handover.handovers:HumanToRobot",
+                "handover.scenarios.robots.free_flyer.handover.handovers:HumanToRobot",
                 "a person gives an object to a free-flyer",
             ),
             "flyer_failed_reception": ScenarioEntry(
-                "handover.scenarios.free_flyer.handover.handovers:FailedReception",
+                "handover.scenarios.robots.free_flyer.handover.handovers:FailedReception",
                 "a free-flyer closes its gripper on nothing, notices, and asks again",
             ),
             "flyer_collaborative": ScenarioEntry(
-                "handover.scenarios.free_flyer.handover.handovers:Collaborative",
+                "handover.scenarios.robots.free_flyer.handover.handovers:Collaborative",
                 "a free-flyer gives an object to a person, waits, and takes it back",
             ),
             "flyer_handover": ScenarioEntry(
-                "handover.scenarios.free_flyer.handover.handovers:HandoverOfTask",
+                "handover.scenarios.robots.free_flyer.handover.handovers:HandoverOfTask",
                 "a free-flyer and a person hand an object over, in one of the four ways",
             ),
             "flyer_two_robots": ScenarioEntry(
-                "handover.scenarios.free_flyer.two_robots.two_robots:TwoRobots",
+                "handover.scenarios.robots.free_flyer.two_robots.two_robots:TwoRobots",
                 "two free-flyers and a person with two hands hand a large object over",
             ),
         },
@@ -152,11 +152,11 @@ SYSTEMS = (
         "ir_grasp",
         {
             "ir_grasp": ScenarioEntry(
-                "handover.scenarios.ir_grasp.ir_grasp:IrGrasp",
+                "handover.scenarios.robots.ir_grasp.ir_grasp:IrGrasp",
                 "a soft hand grasps an object whose place is known roughly, by infrared reflexes",
             ),
             "ir_sensor": ScenarioEntry(
-                "handover.scenarios.ir_grasp.ir_sensor:IrSensor",
+                "handover.scenarios.robots.ir_grasp.ir_sensor:IrSensor",
                 "an infrared sensor on a soft hand approaches a face, as its curve is taken",
             ),
         },

@@ -25,7 +25,7 @@ from handover.cosim.stepping.options import Algorithm
 from handover.fmus import interpreter
 from handover.fmus.compile import TARGETS
 from handover.scenarios.cli.command import main
-from handover.scenarios.results.tables import format_metric
+from handover.scenarios.runs.results.tables import format_metric
 
 COMMANDS = [line for text in blocks(TEXT) for line in text.splitlines() if line.startswith(".venv/")]
 RUNS = [c for c in COMMANDS if " run " in c and "--live" not in c]
@@ -145,7 +145,7 @@ def test_a_unit_is_built_for_all_platforms(folder: Path):
 
 
 def test_commands_that_compile_for_all_platforms_or_film_have_options_that_there_are():
-    """What they do, the first in the tier `platforms`, the other in tests/scenarios/film."""
+    """What they do, the first in the tier `platforms`, the other in tests/scenarios/pages/film."""
     for part in (" --platform all ", " film "):
         done = CliRunner().invoke(main, [*shlex.split(command_with(part))[1:], "--help"])
         assert done.exit_code == 0, done.output

@@ -26,8 +26,8 @@ from handover.cosim.blocks.description import describe
 from handover.fmus.catalog import UNITS, import_class
 from handover.scenarios.catalog import SCENARIOS, SYSTEMS
 from handover.scenarios.cli.command import main
-from handover.scenarios.execution import exit_status
 from handover.scenarios.published.catalog import EXPERIMENTS
+from handover.scenarios.runs.execution import exit_status
 
 DOCS = ROOT / "docs"
 SOURCES = [
@@ -220,7 +220,7 @@ def pictured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     monkeypatch.setattr(pictures, "kept_run", Mock(return_value=run))
     monkeypatch.setattr(pictures, "DOCS", tmp_path)
     monkeypatch.setattr(pictures, "MADE_OF", tmp_path / "pictures.json")
-    page = tmp_path.parent / "scenarios" / "reporting" / "page"
+    page = tmp_path.parent / "scenarios" / "runs" / "reporting" / "page"
     page.mkdir(parents=True, exist_ok=True)
     (page / "page.css").write_text("p {}")
     every = {"ir_grasp.png": ("ir_grasp", "scene"), "report.jpg": ("helix_handover", "")}
@@ -236,7 +236,7 @@ def test_pictures_of_what_there_is_are_current(pictured: ModuleType):
 
 @pytest.mark.parametrize("changed", ["metric", "figure", "style"])
 def test_a_picture_that_is_older_than_what_it_shows_is_named(changed: str, pictured: ModuleType):
-    run, page = pictured.kept_run(), pictured.DOCS.parent / "scenarios" / "reporting" / "page"
+    run, page = pictured.kept_run(), pictured.DOCS.parent / "scenarios" / "runs" / "reporting" / "page"
     if changed == "metric":
         (run / "summary.json").write_text(json.dumps({"metrics": {"displacement": {"value": 0.03}}}))
     elif changed == "figure":

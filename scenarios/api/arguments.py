@@ -20,7 +20,9 @@ from handover.cosim.fmu.file.default_experiment import exact_seconds
 from handover.cosim.record.formats import RECORD_FORMATS
 from handover.cosim.stepping.options import CALL_LIMIT, Algorithm, MasterOptions
 from handover.cosim.typed_data import GREATEST_SEED, is_exact_time
-from handover.scenarios.execution.errors import (
+from handover.scenarios.experiment.experiment import Experiment
+from handover.scenarios.experiment.parameters import InvalidParameter
+from handover.scenarios.runs.execution.errors import (
     ClusterLost,
     RunNotWritten,
     UnitLost,
@@ -28,11 +30,9 @@ from handover.scenarios.execution.errors import (
     WorkersLost,
     one_line_errors,
 )
-from handover.scenarios.execution.fmu_run import is_fmu
-from handover.scenarios.execution.selection import find_scenario
-from handover.scenarios.execution.ssp_run import is_ssp
-from handover.scenarios.experiment.experiment import Experiment
-from handover.scenarios.experiment.parameters import InvalidParameter
+from handover.scenarios.runs.execution.fmu_run import is_fmu
+from handover.scenarios.runs.execution.selection import find_scenario
+from handover.scenarios.runs.execution.ssp_run import is_ssp
 
 Seconds = float | Fraction
 """A time in seconds; a number with a point is taken as it is written, 0.1 as one tenth."""

@@ -13,13 +13,13 @@ from handover.scenarios.api.arguments import errors_for_python, path_of
 from handover.scenarios.api.pages import Page
 from handover.scenarios.api.run_result import Quantity, Run
 from handover.scenarios.api.signals import data_frame
-from handover.scenarios.campaign.folder import CampaignFolder
-from handover.scenarios.execution.errors import require_extra
+from handover.scenarios.runs.campaign.folder import CampaignFolder
+from handover.scenarios.runs.execution.errors import require_extra
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-    from handover.scenarios.campaign.results import PointResults
+    from handover.scenarios.runs.campaign.results import PointResults
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,13 +59,13 @@ class Campaign:
         Raises:
             InvalidInput: it is not the folder of a campaign, or it is damaged; or SciPy is not installed.
         """
-        from handover.scenarios.campaign.table_writer import rebuild_table
+        from handover.scenarios.runs.campaign.table_writer import rebuild_table
 
         self.folder = path_of("folder", folder)
         self._place = CampaignFolder(self.folder)
         with errors_for_python():
             try:
-                from handover.scenarios.campaign.results import read_results  # its statistics take long to load
+                from handover.scenarios.runs.campaign.results import read_results  # its statistics take long to load
             except ImportError:
                 require_extra("campaigns", "campaigns")
                 raise
@@ -119,7 +119,9 @@ class Campaign:
         """
         with errors_for_python():
             require_extra("reports", "reports")
-        from handover.scenarios.campaign_report.campaign_page import write_campaign_page  # Plotly takes long to load
+        from handover.scenarios.pages.campaign_report.campaign_page import (
+            write_campaign_page,  # Plotly takes long to load
+        )
 
         with errors_for_python():
             write_campaign_page(self._place)

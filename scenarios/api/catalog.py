@@ -22,12 +22,12 @@ from handover.scenarios.api.arguments import (
 )
 from handover.scenarios.api.campaign_result import Campaign
 from handover.scenarios.api.run_result import Run
-from handover.scenarios.campaign.folder import OF_NEITHER, CampaignFolder
 from handover.scenarios.catalog import search_folder
-from handover.scenarios.execution.request import RunRequest
-from handover.scenarios.execution.selection import nothing_at
 from handover.scenarios.experiment.experiment import Experiment
-from handover.scenarios.results.run_folder import RunFolder
+from handover.scenarios.runs.campaign.folder import OF_NEITHER, CampaignFolder
+from handover.scenarios.runs.execution.request import RunRequest
+from handover.scenarios.runs.execution.selection import nothing_at
+from handover.scenarios.runs.results.run_folder import RunFolder
 
 
 def unit(name: str, fmi: Literal[2, 3] = 3) -> Path:

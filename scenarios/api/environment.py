@@ -33,7 +33,7 @@ from handover.scenarios.api.arguments import (
 )
 from handover.scenarios.api.open_inputs import HELD_KINDS, OpenSystem
 from handover.scenarios.api.session import Session
-from handover.scenarios.execution.request import RunRequest
+from handover.scenarios.runs.execution.request import RunRequest
 
 Values = dict[str, Any]
 """Values by port's name, as the spaces have them."""

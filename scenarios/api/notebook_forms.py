@@ -9,10 +9,10 @@ from handover.cosim.files import scratch_folder
 from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.parameters import parameters_of
 from handover.scenarios.experiment.time_plot import TimeFigure
-from handover.scenarios.results.lacking_record import LackingRecord
-from handover.scenarios.results.run_facts import RunFacts
-from handover.scenarios.results.tables import headline_rows
-from handover.scenarios.results.tolerated_faults import ToleratedFaults
+from handover.scenarios.runs.results.lacking_record import LackingRecord
+from handover.scenarios.runs.results.run_facts import RunFacts
+from handover.scenarios.runs.results.tables import headline_rows
+from handover.scenarios.runs.results.tolerated_faults import ToleratedFaults
 
 _MAX_FIGURES = 2
 _GOOD, _BAD = "#2e7d32", "#c62828"
@@ -73,7 +73,7 @@ def _time_figures(facts: RunFacts, record: Record) -> tuple[Sequence[TimeFigure]
     """Return the scenario's figures over time, else those of all outputs, and what is left out of them."""
     experiment = facts.experiment
     if experiment is None:
-        from handover.scenarios.reporting.run_figures import figures_of_outputs  # likewise
+        from handover.scenarios.runs.reporting.run_figures import figures_of_outputs  # likewise
 
         return figures_of_outputs(facts.run.get("units", {}), record), ()
     known = LackingRecord(record, experiment.units)

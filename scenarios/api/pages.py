@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from handover.scenarios.api.arguments import path_of
-from handover.scenarios.results.run_folder import make_folder_of, write_whole
+from handover.scenarios.runs.results.run_folder import make_folder_of, write_whole
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from typing import Any
 
 from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
 
-from handover.scenarios.execution.progress import terminal_progress
+from handover.scenarios.runs.execution.progress import terminal_progress
 
 Move = Callable[[float, float, str], None]
 """Is called with what is done, of how much, and what that is in words."""

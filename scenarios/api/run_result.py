@@ -13,15 +13,15 @@ from handover.cosim.record.reader import Record
 from handover.scenarios.api.arguments import InvalidInput, errors_for_python, path_of
 from handover.scenarios.api.pages import Page
 from handover.scenarios.api.signals import SignalTable
-from handover.scenarios.execution.errors import require_extra
-from handover.scenarios.execution.resume import complete_signals
 from handover.scenarios.experiment.display_unit import display_unit
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.parameters import parameters_of
-from handover.scenarios.results.lacking_record import LackingRecord
-from handover.scenarios.results.run_facts import RunFacts, record_of, whole_record_of
-from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
-from handover.scenarios.results.tables import warning_lines
+from handover.scenarios.runs.execution.errors import require_extra
+from handover.scenarios.runs.execution.resume import complete_signals
+from handover.scenarios.runs.results.lacking_record import LackingRecord
+from handover.scenarios.runs.results.run_facts import RunFacts, record_of, whole_record_of
+from handover.scenarios.runs.results.run_folder import InvalidRunFolder, RunFolder
+from handover.scenarios.runs.results.tables import warning_lines
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -164,8 +164,8 @@ class Run:
         """
         with errors_for_python():
             require_extra("reports", "replays")
-        from handover.scenarios.reporting.page import page_html  # Plotly takes long to load
-        from handover.scenarios.reporting.replay_section import replay_section
+        from handover.scenarios.runs.reporting.page import page_html  # Plotly takes long to load
+        from handover.scenarios.runs.reporting.replay_section import replay_section
 
         experiment = self._facts.experiment
         if experiment is None:
@@ -189,8 +189,8 @@ class Run:
         """
         with errors_for_python():
             require_extra("reports", "reports")
-        from handover.scenarios.reporting.run_figures import draw_run
-        from handover.scenarios.reporting.run_page import write_run_page
+        from handover.scenarios.runs.reporting.run_figures import draw_run
+        from handover.scenarios.runs.reporting.run_page import write_run_page
 
         with errors_for_python(), self._place.held():
             if figures:

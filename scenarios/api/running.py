@@ -26,12 +26,12 @@ from handover.scenarios.api.arguments import (
 )
 from handover.scenarios.api.progress import bar
 from handover.scenarios.api.run_result import Run
-from handover.scenarios.execution.errors import require_extra
-from handover.scenarios.execution.input_sources import played_back
-from handover.scenarios.execution.interruption import Interruption
-from handover.scenarios.execution.request import RunRequest, check_subject
-from handover.scenarios.execution.runner import run_task
 from handover.scenarios.experiment.experiment import Experiment
+from handover.scenarios.runs.execution.errors import require_extra
+from handover.scenarios.runs.execution.input_sources import played_back
+from handover.scenarios.runs.execution.interruption import Interruption
+from handover.scenarios.runs.execution.request import RunRequest, check_subject
+from handover.scenarios.runs.execution.runner import run_task
 
 if TYPE_CHECKING:
     from handover.scenarios.api.environment import ScenarioEnvironment

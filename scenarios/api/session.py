@@ -37,12 +37,12 @@ from handover.scenarios.api.arguments import (
     whole_number,
 )
 from handover.scenarios.api.open_inputs import OpenSystem
-from handover.scenarios.execution.fmu_run import is_fmu
-from handover.scenarios.execution.request import RunRequest, check_subject
-from handover.scenarios.execution.ssp_run import is_ssp
 from handover.scenarios.experiment.experiment import Evaluator, Experiment, Outcome
 from handover.scenarios.experiment.parameters import text_of
-from handover.scenarios.results.tolerated_faults import GuardedEvaluator
+from handover.scenarios.runs.execution.fmu_run import is_fmu
+from handover.scenarios.runs.execution.request import RunRequest, check_subject
+from handover.scenarios.runs.execution.ssp_run import is_ssp
+from handover.scenarios.runs.results.tolerated_faults import GuardedEvaluator
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from handover.scenarios.api.signals import SignalTable
 from handover.scenarios.experiment.display_unit import unit_symbol
 from handover.scenarios.experiment.plotting import draw_time_plot, own_style
 from handover.scenarios.experiment.time_plot import COLOURS, Curve, TimePlot
-from handover.scenarios.results.run_facts import elements_of
+from handover.scenarios.runs.results.run_facts import elements_of
 
 _WIDTH, _ALONE, _STACKED = 8.0, 3.0, 2.1
 """Width of a figure, height of a single plot, and of each of several below each other, in."""

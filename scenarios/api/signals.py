@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.exceptions import counted
 from handover.cosim.record.reader import Record
-from handover.scenarios.results.run_facts import elements_of
+from handover.scenarios.runs.results.run_facts import elements_of
 
 if TYPE_CHECKING:
     from pandas import DataFrame

@@ -29,18 +29,18 @@ from handover.scenarios.api.arguments import (
 )
 from handover.scenarios.api.campaign_result import Campaign
 from handover.scenarios.api.progress import bar
-from handover.scenarios.campaign.campaign import run_campaign
-from handover.scenarios.campaign.folder import CampaignFolder, default_folder
-from handover.scenarios.campaign.grid import parse_grid, set_parameters, split_units, vary_units
-from handover.scenarios.campaign.plan import MAX_RUNS, CampaignPlan
-from handover.scenarios.campaign.plan_check import prepared
-from handover.scenarios.campaign.pool_config import LazyPool, PoolConfig
-from handover.scenarios.campaign.worker_pool import RunCounts
-from handover.scenarios.execution.errors import require_extra
-from handover.scenarios.execution.file_experiment import settable_of
-from handover.scenarios.execution.request import RunRequest, check_subject, experiment_type
-from handover.scenarios.execution.selection import path_of_class
 from handover.scenarios.experiment.experiment import Experiment
+from handover.scenarios.runs.campaign.campaign import run_campaign
+from handover.scenarios.runs.campaign.folder import CampaignFolder, default_folder
+from handover.scenarios.runs.campaign.grid import parse_grid, set_parameters, split_units, vary_units
+from handover.scenarios.runs.campaign.plan import MAX_RUNS, CampaignPlan
+from handover.scenarios.runs.campaign.plan_check import prepared
+from handover.scenarios.runs.campaign.pool_config import LazyPool, PoolConfig
+from handover.scenarios.runs.campaign.worker_pool import RunCounts
+from handover.scenarios.runs.execution.errors import require_extra
+from handover.scenarios.runs.execution.file_experiment import settable_of
+from handover.scenarios.runs.execution.request import RunRequest, check_subject, experiment_type
+from handover.scenarios.runs.execution.selection import path_of_class
 
 
 def sweep(

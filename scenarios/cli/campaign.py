@@ -20,17 +20,23 @@ from typing import NoReturn, TextIO
 from rich.progress import BarColumn, TextColumn
 
 from handover.cosim.exceptions import RecordNotWritten, counted
-from handover.scenarios.campaign.campaign import run_campaign
-from handover.scenarios.campaign.folder import CampaignFolder, default_folder
-from handover.scenarios.campaign.plan import CampaignPlan
-from handover.scenarios.campaign.plan_check import PreparedPlan, prepared
-from handover.scenarios.campaign.pool_config import LazyPool, PoolConfig
-from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.campaign.worker_pool import RunCounts, WorkerPool
-from handover.scenarios.execution.errors import ClusterLost, RunNotWritten, UsageError, WorkersLost, one_line_errors
-from handover.scenarios.execution.exit_status import ABORTED, INTERRUPTED, UNIT_FAILED
-from handover.scenarios.execution.progress import say, terminal_progress
-from handover.scenarios.execution.supervisor import leave
+from handover.scenarios.runs.campaign.campaign import run_campaign
+from handover.scenarios.runs.campaign.folder import CampaignFolder, default_folder
+from handover.scenarios.runs.campaign.plan import CampaignPlan
+from handover.scenarios.runs.campaign.plan_check import PreparedPlan, prepared
+from handover.scenarios.runs.campaign.pool_config import LazyPool, PoolConfig
+from handover.scenarios.runs.campaign.table import CampaignTable
+from handover.scenarios.runs.campaign.worker_pool import RunCounts, WorkerPool
+from handover.scenarios.runs.execution.errors import (
+    ClusterLost,
+    RunNotWritten,
+    UsageError,
+    WorkersLost,
+    one_line_errors,
+)
+from handover.scenarios.runs.execution.exit_status import ABORTED, INTERRUPTED, UNIT_FAILED
+from handover.scenarios.runs.execution.progress import say, terminal_progress
+from handover.scenarios.runs.execution.supervisor import leave
 
 _PAUSE = 30.0
 """Seconds from one line to the next where there is no terminal."""

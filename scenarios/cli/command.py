@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from handover.scenarios.execution.exit_status import abort
+from handover.scenarios.runs.execution.exit_status import abort
 
 _HELP = """Robots that hand objects over, co-simulated as Functional Mock-up Units.
 
@@ -115,7 +115,7 @@ class DeferringGroup(click.Group):
             vars(e)["message"] = visible(e.message)
             raise
         except ImportError as e:
-            from handover.scenarios.execution.errors import missing_package  # loaded for this alone
+            from handover.scenarios.runs.execution.errors import missing_package  # loaded for this alone
 
             raise missing_package(e) from e
 

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 import click
 
 from handover.scenarios.cli.options import trust_option
-from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
-from handover.scenarios.execution.progress import doing, say
-from handover.scenarios.results.run_folder import RunFolder, dated_folder
+from handover.scenarios.runs.execution.errors import UsageError, one_line_errors, require_extra
+from handover.scenarios.runs.execution.progress import doing, say
+from handover.scenarios.runs.results.run_folder import RunFolder, dated_folder
 
 if TYPE_CHECKING:
-    from handover.scenarios.comparison.page import Comparison
+    from handover.scenarios.pages.comparison.page import Comparison
 
 _HELP = """Put campaigns, or runs, of one scenario on one page and in one table.
 
@@ -74,9 +74,9 @@ def compare(
 ) -> None:
     """Put campaigns, or runs, on one page."""
     require_extra("reports", "the page")
-    from handover.scenarios.comparison.entries import NotComparable  # pages and statistics take long to load
-    from handover.scenarios.comparison.page import compare as compared
-    from handover.scenarios.comparison.page import write_comparison
+    from handover.scenarios.pages.comparison.entries import NotComparable  # pages and statistics take long to load
+    from handover.scenarios.pages.comparison.page import compare as compared
+    from handover.scenarios.pages.comparison.page import write_comparison
 
     with one_line_errors(), contextlib.ExitStack() as opened:
         folder = None if out is None else RunFolder(out)

@@ -26,14 +26,14 @@ from handover.fmus.catalog import UNITS
 from handover.scenarios.catalog import InvalidScenario, ScenarioSource, named_scenario
 from handover.scenarios.cli.master_options import CONTROL_FIELDS
 from handover.scenarios.cli.options import HeadedCommand
-from handover.scenarios.execution.errors import UsageError
-from handover.scenarios.execution.progress import say
-from handover.scenarios.execution.request import experiment_type, is_file
-from handover.scenarios.execution.selection import is_path_of_class
-from handover.scenarios.execution.unit_values import split_parameters
 from handover.scenarios.experiment.parameters import InvalidParameter, idle_parameters
-from handover.scenarios.results.folder_data import RunData
-from handover.scenarios.results.run_folder import sha256_of, version_differences, versions
+from handover.scenarios.runs.execution.errors import UsageError
+from handover.scenarios.runs.execution.progress import say
+from handover.scenarios.runs.execution.request import experiment_type, is_file
+from handover.scenarios.runs.execution.selection import is_path_of_class
+from handover.scenarios.runs.execution.unit_values import split_parameters
+from handover.scenarios.runs.results.folder_data import RunData
+from handover.scenarios.runs.results.run_folder import sha256_of, version_differences, versions
 
 _META = "handover.config"
 _TABLES = {"parameters": "parameters", "unit": "replaced", "sweep": "grid"}

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, NoReturn
 
 from handover.cosim.imported_elsewhere import ImportedElsewhere
 from handover.cosim.python_process import import_path
-from handover.scenarios.execution.exit_status import UNIT_FAILED, abort
+from handover.scenarios.runs.execution.exit_status import UNIT_FAILED, abort
 
 if TYPE_CHECKING:
     from handover.cosim.fmu.heartbeat import Heartbeat
-    from handover.scenarios.execution.child_process import ChildEnd
+    from handover.scenarios.runs.execution.child_process import ChildEnd
 
 _SUPERVISED = ("run", "resume")
 """Commands that load units, which may crash the process that they are in."""
@@ -40,7 +40,7 @@ def main() -> None:
     open_standard_streams()
     try:
         if sys.argv[1:2] and sys.argv[1] in _SUPERVISED:
-            from handover.scenarios.execution.supervisor import can_supervise, run_to_end, supervise
+            from handover.scenarios.runs.execution.supervisor import can_supervise, run_to_end, supervise
 
             if can_supervise():
                 supervise(_command, _report_crash)

@@ -13,13 +13,13 @@ from handover.cosim.system.system import System
 from handover.fmus.build import cached
 from handover.fmus.contents.fmi2_description import NoFmi2Form
 from handover.scenarios.cli.options import check_new_file, refused_if_taken, scenario_options
-from handover.scenarios.execution.errors import UsageError, one_line_errors
-from handover.scenarios.execution.interruption import Interruption
-from handover.scenarios.execution.progress import doing, say
-from handover.scenarios.execution.selection import find_scenario, replacements, select_fmus
-from handover.scenarios.execution.unit_values import built_system, split_parameters
 from handover.scenarios.experiment.parameters import check_effects
-from handover.scenarios.results.tolerated_faults import scenario_code
+from handover.scenarios.runs.execution.errors import UsageError, one_line_errors
+from handover.scenarios.runs.execution.interruption import Interruption
+from handover.scenarios.runs.execution.progress import doing, say
+from handover.scenarios.runs.execution.selection import find_scenario, replacements, select_fmus
+from handover.scenarios.runs.execution.unit_values import built_system, split_parameters
+from handover.scenarios.runs.results.tolerated_faults import scenario_code
 
 _HELP = """Write a SCENARIO as an SSP (System Structure and Parameterization), which other tools load.
 

@@ -11,16 +11,16 @@ import click
 from rich.progress import BarColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from handover.cosim.exceptions import counted
-from handover.scenarios.campaign.folder import OF_NEITHER, CampaignFolder
 from handover.scenarios.cli.options import FiniteRange, check_new_file, refused_if_taken, trust_option
-from handover.scenarios.execution.errors import FilmFailed, UsageError, one_line_errors, require_extra
-from handover.scenarios.execution.interruption import Interruption
-from handover.scenarios.execution.progress import doing, say, terminal_progress
-from handover.scenarios.film import LARGEST, SMALLEST
-from handover.scenarios.results.run_folder import RunFolder
+from handover.scenarios.pages.film import LARGEST, SMALLEST
+from handover.scenarios.runs.campaign.folder import OF_NEITHER, CampaignFolder
+from handover.scenarios.runs.execution.errors import FilmFailed, UsageError, one_line_errors, require_extra
+from handover.scenarios.runs.execution.interruption import Interruption
+from handover.scenarios.runs.execution.progress import doing, say, terminal_progress
+from handover.scenarios.runs.results.run_folder import RunFolder
 
 if TYPE_CHECKING:
-    from handover.scenarios.film.film import FilmSettings
+    from handover.scenarios.pages.film.film import FilmSettings
 
 _HELP = """Make a film of the run in DIR: its scene, and beside it plots over time with a cursor that moves.
 
@@ -103,7 +103,7 @@ def film(
         require_extra("film", "the film")
         run, path = _run(folder), file or folder / "film.mp4"
         _check(path, plots, fps, force=force, no_plots=no_plots)
-        from handover.scenarios.film.film import FilmSettings  # a browser's library takes long to load
+        from handover.scenarios.pages.film.film import FilmSettings  # a browser's library takes long to load
 
         fps = fps or (_GIF_FPS if path.suffix.lower() == ".gif" else _FPS)
         settings = FilmSettings(size=size, pace=pace, fps=fps, view=view, dark=dark)
@@ -149,11 +149,11 @@ def _film(run: RunFolder, path: Path, plots: Sequence[str] | None, settings: "Fi
         UsageError: there is no browser, nothing to be shown, or a file that is not to be replaced.
         FilmFailed: the browser failed.
     """
-    from handover.scenarios.execution.resume import complete_signals
-    from handover.scenarios.film.browser import BrowserFailed, NoBrowser, window_of
-    from handover.scenarios.film.film import write_film
-    from handover.scenarios.film.film_page import NotFilmed, film_content
-    from handover.scenarios.results.run_facts import RunFacts
+    from handover.scenarios.pages.film.browser import BrowserFailed, NoBrowser, window_of
+    from handover.scenarios.pages.film.film import write_film
+    from handover.scenarios.pages.film.film_page import NotFilmed, film_content
+    from handover.scenarios.runs.execution.resume import complete_signals
+    from handover.scenarios.runs.results.run_facts import RunFacts
 
     with run.held():
         RunFacts.read(run)  # before anything is completed: it may be no run's folder at all

@@ -31,12 +31,12 @@ from handover.scenarios.catalog import (
 )
 from handover.scenarios.cli.console import open_console, print_json, print_rows
 from handover.scenarios.cli.summaries.port_tables import allowed, plain, port_rows, type_of, variable_data
-from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
-from handover.scenarios.execution.progress import doing
-from handover.scenarios.execution.selection import find_scenario, python_file_fault
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.places import PlacePort, ports_of_place
-from handover.scenarios.results.run_folder import check_place
+from handover.scenarios.runs.execution.errors import UsageError, one_line_errors, require_extra
+from handover.scenarios.runs.execution.progress import doing
+from handover.scenarios.runs.execution.selection import find_scenario, python_file_fault
+from handover.scenarios.runs.results.run_folder import check_place
 
 
 @click.command("list", short_help="List scenarios and units, or what one of them takes and gives.")

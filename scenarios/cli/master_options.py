@@ -10,7 +10,7 @@ import click
 from handover.cosim.master.unit_options import ALL
 from handover.cosim.stepping.options import AdaptiveStep, Algorithm, Extrapolation, MasterOptions
 from handover.scenarios.cli.options import HeadedOption, Seconds, WholeNumber
-from handover.scenarios.execution.errors import UsageError
+from handover.scenarios.runs.execution.errors import UsageError
 
 _PLAIN = MasterOptions()
 _CONTROL = AdaptiveStep()

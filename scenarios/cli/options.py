@@ -19,9 +19,9 @@ import click
 from handover.cosim.files import FileTaken
 from handover.cosim.stepping.options import CALL_LIMIT
 from handover.cosim.typed_data import GREATEST_SEED, is_exact_time
-from handover.scenarios.execution.errors import UsageError
-from handover.scenarios.execution.progress import LOG_LEVELS
-from handover.scenarios.results.run_folder import check_place
+from handover.scenarios.runs.execution.errors import UsageError
+from handover.scenarios.runs.execution.progress import LOG_LEVELS
+from handover.scenarios.runs.results.run_folder import check_place
 
 _TAKEN = "it is there already; --force replaces it"
 

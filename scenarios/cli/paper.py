@@ -16,9 +16,9 @@ from handover.cosim.exceptions import nearest
 from handover.scenarios.cli.campaign import CampaignOutcome, pool_config, run_campaign_command
 from handover.scenarios.cli.console import open_console
 from handover.scenarios.cli.options import SEED, HeadedCommand, campaign_options
-from handover.scenarios.execution.errors import UsageError, require_extra
-from handover.scenarios.execution.progress import doing, say
-from handover.scenarios.results.run_folder import InvalidRunFolder
+from handover.scenarios.runs.execution.errors import UsageError, require_extra
+from handover.scenarios.runs.execution.progress import doing, say
+from handover.scenarios.runs.results.run_folder import InvalidRunFolder
 
 if TYPE_CHECKING:
     from handover.scenarios.published.published_experiment import PublishedExperiment
@@ -95,9 +95,9 @@ class _Finish:
 
     def __call__(self, outcome: CampaignOutcome) -> None:
         folder, table = outcome.folder, outcome.table
-        from handover.scenarios.campaign_report.campaign_page import write_campaign_report
         from handover.scenarios.cli.summaries.campaign import print_report_place
         from handover.scenarios.cli.summaries.claims import print_results
+        from handover.scenarios.pages.campaign_report.campaign_page import write_campaign_report
         from handover.scenarios.published.published_experiment import PaperResults, draw_figures, write_claims
 
         try:

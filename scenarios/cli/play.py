@@ -14,11 +14,11 @@ import click
 from handover.cosim.exceptions import counted
 from handover.scenarios.cli.options import FiniteRange, HeadedCommand, scenario_options, stop_option
 from handover.scenarios.cli.run import file_options
-from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
-from handover.scenarios.execution.progress import say
-from handover.scenarios.execution.request import RUNS, RunRequest
 from handover.scenarios.experiment.experiment import Experiment
-from handover.scenarios.results.run_folder import RunFolder, dated_folder
+from handover.scenarios.runs.execution.errors import UsageError, one_line_errors, require_extra
+from handover.scenarios.runs.execution.progress import say
+from handover.scenarios.runs.execution.request import RUNS, RunRequest
+from handover.scenarios.runs.results.run_folder import RunFolder, dated_folder
 
 if TYPE_CHECKING:
     from handover.scenarios.live.play_page import Session

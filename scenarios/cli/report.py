@@ -4,11 +4,11 @@ from pathlib import Path
 
 import click
 
-from handover.scenarios.campaign.folder import OF_NEITHER, CampaignFolder
 from handover.scenarios.cli.options import page_to_write, trust_option
-from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
-from handover.scenarios.execution.progress import doing, say
-from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder, check_no_links, check_place
+from handover.scenarios.runs.campaign.folder import OF_NEITHER, CampaignFolder
+from handover.scenarios.runs.execution.errors import UsageError, one_line_errors, require_extra
+from handover.scenarios.runs.execution.progress import doing, say
+from handover.scenarios.runs.results.run_folder import InvalidRunFolder, RunFolder, check_no_links, check_place
 
 _HELP = """Write the page of the run or campaign in DIR again: one HTML file that opens offline.
 
@@ -55,8 +55,8 @@ def report(folder: Path, figures: bool, runs: bool, file: Path | None) -> None:
 
 
 def _write_of_campaign(campaign: CampaignFolder, page: Path, figures: bool, runs: bool) -> None:
-    from handover.scenarios.campaign.table_writer import rebuild_table  # pyarrow is slow to import
-    from handover.scenarios.campaign_report.campaign_page import write_campaign_page, write_campaign_report
+    from handover.scenarios.pages.campaign_report.campaign_page import write_campaign_page, write_campaign_report
+    from handover.scenarios.runs.campaign.table_writer import rebuild_table  # pyarrow is slow to import
 
     if runs:
         check_no_links(campaign.path, "runs", "runs/*")
@@ -69,7 +69,7 @@ def _write_of_campaign(campaign: CampaignFolder, page: Path, figures: bool, runs
 
 def _write_of_runs(campaign: CampaignFolder) -> None:
     """Write the pages of a campaign's runs; a line for each that cannot be made."""
-    from handover.scenarios.campaign.table import CampaignTable
+    from handover.scenarios.runs.campaign.table import CampaignTable
 
     for name in CampaignTable.read(campaign.table).column("run").tolist():
         run = RunFolder.of_run(campaign.runs / name)
@@ -82,10 +82,10 @@ def _write_of_runs(campaign: CampaignFolder) -> None:
 
 
 def _write_of_run(run: RunFolder, page: Path, figures: bool) -> None:
-    from handover.scenarios.execution.resume import complete_signals
-    from handover.scenarios.reporting.run_figures import draw_run
-    from handover.scenarios.reporting.run_page import write_run_page
-    from handover.scenarios.results.run_facts import RunFacts
+    from handover.scenarios.runs.execution.resume import complete_signals
+    from handover.scenarios.runs.reporting.run_figures import draw_run
+    from handover.scenarios.runs.reporting.run_page import write_run_page
+    from handover.scenarios.runs.results.run_facts import RunFacts
 
     with run.held():
         RunFacts.read(run)  # before anything is completed: it may be no run's folder at all

@@ -8,16 +8,16 @@ from pathlib import Path
 
 import click
 
-from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.cli.master_options import isolate_option, isolated
 from handover.scenarios.cli.options import limit_options, limits, log_option
 from handover.scenarios.cli.summaries.run import RunEnding
-from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
-from handover.scenarios.execution.interruption import Interruption
-from handover.scenarios.execution.progress import logging_to_standard_error, progress_bar, say
-from handover.scenarios.execution.resume import InterruptedRun
-from handover.scenarios.execution.runner import run_task
-from handover.scenarios.results.run_folder import RunFolder
+from handover.scenarios.runs.campaign.folder import CampaignFolder
+from handover.scenarios.runs.execution.errors import UsageError, one_line_errors, require_extra
+from handover.scenarios.runs.execution.interruption import Interruption
+from handover.scenarios.runs.execution.progress import logging_to_standard_error, progress_bar, say
+from handover.scenarios.runs.execution.resume import InterruptedRun
+from handover.scenarios.runs.execution.runner import run_task
+from handover.scenarios.runs.results.run_folder import RunFolder
 
 _HELP = """Resume a run that was interrupted, was killed or failed, from its last checkpoint.
 

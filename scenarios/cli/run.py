@@ -29,16 +29,16 @@ from handover.scenarios.cli.options import (
     stop_option,
 )
 from handover.scenarios.cli.summaries.run import AS_JSON, RunEnding
-from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
-from handover.scenarios.execution.input_sources import played_back
-from handover.scenarios.execution.interruption import Interruption
-from handover.scenarios.execution.progress import logging_to_standard_error, progress_bar, say
-from handover.scenarios.execution.request import RunRequest
-from handover.scenarios.execution.runner import run_task
 from handover.scenarios.experiment.live_inputs import inputs_of_pushes
-from handover.scenarios.results.run_facts import whole_record_of
-from handover.scenarios.results.run_folder import RunFolder
-from handover.scenarios.results.task import InputSources, Task
+from handover.scenarios.runs.execution.errors import UsageError, one_line_errors, require_extra
+from handover.scenarios.runs.execution.input_sources import played_back
+from handover.scenarios.runs.execution.interruption import Interruption
+from handover.scenarios.runs.execution.progress import logging_to_standard_error, progress_bar, say
+from handover.scenarios.runs.execution.request import RunRequest
+from handover.scenarios.runs.execution.runner import run_task
+from handover.scenarios.runs.results.run_facts import whole_record_of
+from handover.scenarios.runs.results.run_folder import RunFolder
+from handover.scenarios.runs.results.task import InputSources, Task
 
 _option = partial(click.option, cls=HeadedOption, heading="Of FILE.ssp and FILE.fmu")
 _STEP = _option(

@@ -11,8 +11,6 @@ from typing import Any
 import click
 
 from handover.cosim.stepping.options import MasterOptions
-from handover.scenarios.campaign.grid import parse_grid, set_parameters, split_units, vary_units
-from handover.scenarios.campaign.plan import MAX_REPETITIONS, CampaignPlan
 from handover.scenarios.cli.campaign import CampaignOutcome, pool_config, run_campaign_command
 from handover.scenarios.cli.config_file import ConfiguredCommand, config_option
 from handover.scenarios.cli.master_options import coupling_of, master_options
@@ -26,9 +24,11 @@ from handover.scenarios.cli.options import (
     stop_option,
 )
 from handover.scenarios.cli.run import file_options, recorded_option
-from handover.scenarios.execution.errors import one_line_errors, require_extra
-from handover.scenarios.execution.progress import doing, say
-from handover.scenarios.execution.request import RunRequest, experiment_type
+from handover.scenarios.runs.campaign.grid import parse_grid, set_parameters, split_units, vary_units
+from handover.scenarios.runs.campaign.plan import MAX_REPETITIONS, CampaignPlan
+from handover.scenarios.runs.execution.errors import one_line_errors, require_extra
+from handover.scenarios.runs.execution.progress import doing, say
+from handover.scenarios.runs.execution.request import RunRequest, experiment_type
 
 _HELP = """Run a SCENARIO, SSP or FMU many times: all combinations of the given values, each --repeat times.
 
@@ -155,8 +155,8 @@ def sweep(
 
 def _finish(outcome: CampaignOutcome, *, as_json: bool, report: bool) -> None:
     """Print the results, then write the report, and print where it is."""
-    from handover.scenarios.campaign.results import CampaignResults  # its statistics take long to load
     from handover.scenarios.cli.summaries.campaign import campaign_data, print_campaign, print_report_place
+    from handover.scenarios.runs.campaign.results import CampaignResults  # its statistics take long to load
 
     folder = outcome.folder
     results = CampaignResults(folder.read(), outcome.table)
@@ -164,7 +164,9 @@ def _finish(outcome: CampaignOutcome, *, as_json: bool, report: bool) -> None:
         print_campaign(results, outcome.counts, folder)
     if report and not folder.is_reported:
         with doing("drawing figures, writing the report"):
-            from handover.scenarios.campaign_report.campaign_page import write_campaign_report  # takes long to load
+            from handover.scenarios.pages.campaign_report.campaign_page import (
+                write_campaign_report,  # takes long to load
+            )
 
             for line in write_campaign_report(folder):
                 say(line)

@@ -32,7 +32,7 @@ def paper_entry(scenario: str, group: str, name: str) -> dict[str, Any]:
 @functools.lru_cache
 def _read(scenario: str) -> dict[str, Any]:
     return tomli.loads(
-        resources.files(f"handover.scenarios.{scenario}").joinpath("paper.toml").read_text(encoding="utf-8")
+        resources.files(f"handover.scenarios.robots.{scenario}").joinpath("paper.toml").read_text(encoding="utf-8")
     )
 
 
@@ -42,7 +42,7 @@ class PublishedValue(Checked):
 
     Attributes:
         metric: name of the run's metric.
-        paper: the package of `scenarios` whose `paper.toml` has the value.
+        paper: the package of `scenarios.robots` whose `paper.toml` has the value.
         name: of the value in that file's group `published`.
         index: of the element that belongs to the run, where the value is an array.
         span: names of the published minimum and maximum, indexed alike; empty if one value was published.

@@ -8,8 +8,8 @@ import socket
 import sys
 from pathlib import Path
 
-from handover.scenarios.execution.selection import find_scenario
 from handover.scenarios.live.server import watch
+from handover.scenarios.runs.execution.selection import find_scenario
 
 if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the run's: it ends, and this with it

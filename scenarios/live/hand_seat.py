@@ -25,7 +25,7 @@ from handover.scenarios.live.connections import (
 )
 from handover.scenarios.live.hand_messages import HandSample, HandStream, InvalidHandMessage, hand_start
 from handover.scenarios.live.shared_inputs import SharedInputs
-from handover.scenarios.results.run_folder import write_whole
+from handover.scenarios.runs.results.run_folder import write_whole
 
 INPUTS_FILE = "inputs.json"
 """Name of the file in a run's folder that says which devices led a hand, and how old samples were at their use."""

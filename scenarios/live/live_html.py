@@ -11,10 +11,10 @@ from handover.scenarios.experiment.live_inputs import HandHint
 from handover.scenarios.experiment.time_plot import TimePlot
 from handover.scenarios.live.shown_run import ShownRun
 from handover.scenarios.live.webcam import WEBCAM_SCRIPTS
-from handover.scenarios.reporting.html import packed_json
-from handover.scenarios.reporting.page import Section, asset, page_html, template
-from handover.scenarios.reporting.replay_section import FILM_HTML, SCENE_SCRIPTS, VIEWPORT_HTML
-from handover.scenarios.reporting.time_plots import time_figure
+from handover.scenarios.runs.reporting.html import packed_json
+from handover.scenarios.runs.reporting.page import Section, asset, page_html, template
+from handover.scenarios.runs.reporting.replay_section import FILM_HTML, SCENE_SCRIPTS, VIEWPORT_HTML
+from handover.scenarios.runs.reporting.time_plots import time_figure
 
 
 def figure_json(plot: TimePlot, time: Floats) -> str:

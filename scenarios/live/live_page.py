@@ -50,9 +50,9 @@ from handover.scenarios.live.live_scene import LiveScene
 from handover.scenarios.live.shown_run import ShownRun
 from handover.scenarios.live.viewers import Viewers
 from handover.scenarios.live.webcam import WebcamFiles
-from handover.scenarios.reporting.html import packed_json
-from handover.scenarios.results.run_facts import whole_record_of
-from handover.scenarios.results.run_folder import InvalidRunFolder
+from handover.scenarios.runs.reporting.html import packed_json
+from handover.scenarios.runs.results.run_facts import whole_record_of
+from handover.scenarios.runs.results.run_folder import InvalidRunFolder
 
 T = TypeVar("T")
 

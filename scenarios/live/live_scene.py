@@ -17,15 +17,15 @@ from handover.scenarios.experiment.live_inputs import HandHint, LedHand, Pushabl
 from handover.scenarios.experiment.replay import Body, Line, Replay
 from handover.scenarios.experiment.time_plot import Curve, TimePlot, phases_of
 from handover.scenarios.live.hand_messages import HandSample
-from handover.scenarios.reporting.replay_section import (
+from handover.scenarios.runs.reporting.replay_section import (
     Drawn,
     drawn_groups,
     legend_html,
     scene_content,
     views_html,
 )
-from handover.scenarios.results.run_facts import elements_of
-from handover.scenarios.results.tolerated_faults import ToleratedFaults
+from handover.scenarios.runs.results.run_facts import elements_of
+from handover.scenarios.runs.results.tolerated_faults import ToleratedFaults
 
 _AROUND = 0.25
 """Room around what is drawn at first, as a share of its longest side: things move."""
@@ -218,7 +218,7 @@ class LiveScene:
         own = () if self._experiment is None else self._experiment.plots(self._parameters, self._history)
         if own:
             return own
-        from handover.scenarios.reporting.run_figures import figures_of_outputs  # matplotlib is slow to import
+        from handover.scenarios.runs.reporting.run_figures import figures_of_outputs  # matplotlib is slow to import
 
         units = dict.fromkeys(signal.rpartition(".")[0] for signal in self._history.signals)
         return [plot for figure in figures_of_outputs(units, self._history) for plot in figure.plots]

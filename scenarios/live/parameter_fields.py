@@ -14,11 +14,11 @@ from handover.cosim.blocks.start_values import range_of
 from handover.cosim.blocks.variable import Declared, Kind
 from handover.cosim.fmu.file.description import FmuPort, describe_fmu
 from handover.cosim.ssp.ssp_file import SspFile
-from handover.scenarios.execution.errors import UsageError, one_line_errors
-from handover.scenarios.execution.fmu_run import is_fmu
-from handover.scenarios.execution.request import RunRequest
-from handover.scenarios.execution.ssp_run import is_ssp
 from handover.scenarios.experiment.parameters import InvalidParameter, text_of
+from handover.scenarios.runs.execution.errors import UsageError, one_line_errors
+from handover.scenarios.runs.execution.fmu_run import is_fmu
+from handover.scenarios.runs.execution.request import RunRequest
+from handover.scenarios.runs.execution.ssp_run import is_ssp
 
 _SLIDERS = 4
 """Entries that an array of numbers may have for a slider each; a longer one is a line of text."""

@@ -18,7 +18,6 @@ from starlette.routing import BaseRoute, Route
 from starlette.websockets import WebSocket
 
 from handover.cosim.master.live_control import LiveControl
-from handover.scenarios.execution.request import RunRequest
 from handover.scenarios.live.commands import COMMANDS, Command, choice_of, pace_of, run_number
 from handover.scenarios.live.connections import HEADERS
 from handover.scenarios.live.live_html import live_html
@@ -27,7 +26,8 @@ from handover.scenarios.live.parameter_fields import FieldGroup, faults_by_name,
 from handover.scenarios.live.played_run import Choice, PlayedRun
 from handover.scenarios.live.shown_run import ShownRun
 from handover.scenarios.live.waiting_command import WaitingCommand
-from handover.scenarios.reporting.page import template
+from handover.scenarios.runs.execution.request import RunRequest
+from handover.scenarios.runs.reporting.page import template
 
 _PATIENCE = 15.0
 """How long a run may take to end after its step, s."""

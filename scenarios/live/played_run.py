@@ -17,16 +17,16 @@ import numpy as np
 from handover.cosim.master.live_control import LiveControl
 from handover.cosim.python_process import code_command
 from handover.fmus.sources import source_file
-from handover.scenarios.execution.input_sources import recorded_input_names
-from handover.scenarios.execution.request import RunRequest
-from handover.scenarios.execution.selection import is_path_of_class
 from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.live.process import CONTROL_FILE
 from handover.scenarios.live.waiting_command import WaitingCommand
 from handover.scenarios.live.watched_run import WatchedRun
-from handover.scenarios.results.run_facts import whole_record_of
-from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
-from handover.scenarios.results.tables import format_metric
+from handover.scenarios.runs.execution.input_sources import recorded_input_names
+from handover.scenarios.runs.execution.request import RunRequest
+from handover.scenarios.runs.execution.selection import is_path_of_class
+from handover.scenarios.runs.results.run_facts import whole_record_of
+from handover.scenarios.runs.results.run_folder import InvalidRunFolder, RunFolder
+from handover.scenarios.runs.results.tables import format_metric
 
 _ENTRY = "from handover.scenarios.cli.entry import main; main()"
 

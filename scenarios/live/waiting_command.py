@@ -18,7 +18,7 @@ from handover.cosim.python_process import code_command
 _LOADED = (
     "handover.scenarios.cli.command",
     "handover.scenarios.cli.run",
-    "handover.scenarios.execution.runner",
+    "handover.scenarios.runs.execution.runner",
     "handover.scenarios.live.process",
 )
 _PROGRAM = (
@@ -97,7 +97,7 @@ def _line() -> bytes:
 
 def wait_for_arguments() -> None:
     """Load what a run needs, and wait; then `sys.argv` is the command's."""
-    from handover.scenarios.execution.selection import load_units  # of the process that waits alone
+    from handover.scenarios.runs.execution.selection import load_units  # of the process that waits alone
 
     with contextlib.suppress(ImportError):  # nothing needs it; where it is installed, pyarrow imports it in the run
         importlib.import_module("pandas")

@@ -11,8 +11,8 @@ from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.live_inputs import LedHand
 from handover.scenarios.experiment.parameters import InvalidParameter, parameters_of
 from handover.scenarios.live.live_scene import LiveScene, RecordedScene
-from handover.scenarios.results.run_facts import whole_record_of
-from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
+from handover.scenarios.runs.results.run_facts import whole_record_of
+from handover.scenarios.runs.results.run_folder import InvalidRunFolder, RunFolder
 
 
 class WatchedRun:

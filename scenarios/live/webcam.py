@@ -23,7 +23,7 @@ from starlette.responses import Response
 from starlette.routing import Route
 
 from handover.cosim.files import read_regular
-from handover.scenarios.reporting.page import asset
+from handover.scenarios.runs.reporting.page import asset
 
 WEBCAM_SCRIPTS = ("hand/hand_landmarks.js", "hand/hand_camera.js")
 """Scripts of a page that offers a webcam."""

@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
-from handover.scenarios.campaign.statistics import Interval
 from handover.scenarios.published.published_experiment import Claim, Verdict
 from handover.scenarios.published.verdicts import nothing_measured, verdict_of, with_shortfall
+from handover.scenarios.runs.campaign.statistics import Interval
 
 
 @dataclass(frozen=True)

@@ -12,13 +12,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
-from handover.scenarios.campaign.folder import CampaignFolder
-from handover.scenarios.campaign.plan import CampaignPlan
-from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.display_unit import DisplayUnit, display_unit
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.published.runs import Row, Runs, is_done
-from handover.scenarios.results.run_folder import disk_errors_reported, folder_within, write_whole
+from handover.scenarios.runs.campaign.folder import CampaignFolder
+from handover.scenarios.runs.campaign.plan import CampaignPlan
+from handover.scenarios.runs.campaign.table import CampaignTable
+from handover.scenarios.runs.results.run_folder import disk_errors_reported, folder_within, write_whole
 
 
 class Verdict(str, enum.Enum):

@@ -8,8 +8,8 @@ from typing import Any, cast
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
-from handover.scenarios.campaign.plan import CampaignPlan, is_number
-from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.runs.campaign.plan import CampaignPlan, is_number
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 Row = Mapping[str, Any]
 """A run in a campaign's table: columns and values, of which None is null."""

@@ -5,10 +5,10 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
-from handover.scenarios.campaign.statistics import Statistic, success_interval
 from handover.scenarios.published.published_experiment import ComparisonTable
 from handover.scenarios.published.runs import Count
 from handover.scenarios.published.verdicts import format_interval
+from handover.scenarios.runs.campaign.statistics import Statistic, success_interval
 
 
 def table_of(title: str, rows: Iterable[Mapping[str, str]], note: str = "") -> ComparisonTable:

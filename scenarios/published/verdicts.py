@@ -14,7 +14,8 @@ import numpy as np
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.exceptions import counted
-from handover.scenarios.campaign.statistics import (
+from handover.scenarios.published.published_experiment import Claim, Verdict
+from handover.scenarios.runs.campaign.statistics import (
     LEVEL,
     RESAMPLES,
     Interval,
@@ -25,7 +26,6 @@ from handover.scenarios.campaign.statistics import (
     time_interval,
     two_proportions,
 )
-from handover.scenarios.published.published_experiment import Claim, Verdict
 
 FEW = 0.10
 """Share of runs below which something counts as not happening."""

@@ -11,12 +11,12 @@ from typing import Any
 import pyarrow.parquet as pq
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from handover.scenarios.campaign.folder import CampaignFolder
-from handover.scenarios.campaign.plan import CampaignPlan
-from handover.scenarios.campaign.table import RunRow
-from handover.scenarios.campaign.table_writer import table_of
-from handover.scenarios.campaign_report.campaign_page import write_campaign_page
 from handover.scenarios.experiment.experiment import Metric
+from handover.scenarios.pages.campaign_report.campaign_page import write_campaign_page
+from handover.scenarios.runs.campaign.folder import CampaignFolder
+from handover.scenarios.runs.campaign.plan import CampaignPlan
+from handover.scenarios.runs.campaign.table import RunRow
+from handover.scenarios.runs.campaign.table_writer import table_of
 
 STRATEGIES = ("reflex", "blind", "forward")
 FEW, MANY = 300, 3000

@@ -13,8 +13,8 @@ import pyarrow.csv as csv
 import pyarrow.parquet as pq
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from handover.scenarios.reporting.run_page import write_run_page
-from handover.scenarios.results.run_folder import RunFolder
+from handover.scenarios.runs.reporting.run_page import write_run_page
+from handover.scenarios.runs.results.run_folder import RunFolder
 
 ROWS, COLUMNS = 100_000, 40
 TARGET = 5.0

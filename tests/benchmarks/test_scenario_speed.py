@@ -21,9 +21,9 @@ from handover.cosim.system.signals import Signals
 from handover.fmus.build import cached
 from handover.plants.ir_grasp.objects import Thing
 from handover.scenarios.catalog import SCENARIOS
-from handover.scenarios.execution.runner import experiment_system
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.parameters import parse_parameters
+from handover.scenarios.runs.execution.runner import experiment_system
 
 RUNS: dict[str, tuple[str, list[str], dict[str, str]]] = {
     **{name: (name, [], {}) for name in ("flyer_impedance", "flyer_robot_to_human", "flyer_collaborative")},

@@ -67,8 +67,8 @@ def test_the_command_runs_none_of_them(planted: Path):
 
 
 def test_folders_of_own_modules_come_last_and_only_where_one_is_named(planted: Path, monkeypatch: pytest.MonkeyPatch):
-    from handover.scenarios.execution.errors import UsageError
-    from handover.scenarios.execution.selection import find_scenario
+    from handover.scenarios.runs.execution.errors import UsageError
+    from handover.scenarios.runs.execution.selection import find_scenario
 
     before = [p for p in sys.path if p]
     monkeypatch.setattr(sys, "path", [*before])

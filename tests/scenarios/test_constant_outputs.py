@@ -15,10 +15,10 @@ from handover.fmus.build import cached
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.cli.command import main
 from handover.scenarios.experiment.parameters import parse_parameters
-from handover.scenarios.reporting.run_figures import draw_figures
-from handover.scenarios.reporting.run_page import write_run_page
-from handover.scenarios.results.run_folder import RunFolder
-from handover.scenarios.results.tolerated_faults import GuardedEvaluator, ToleratedFaults, fault_line
+from handover.scenarios.runs.reporting.run_figures import draw_figures
+from handover.scenarios.runs.reporting.run_page import write_run_page
+from handover.scenarios.runs.results.run_folder import RunFolder
+from handover.scenarios.runs.results.tolerated_faults import GuardedEvaluator, ToleratedFaults, fault_line
 
 KINDS = {"zero": 0.0, "one": 1.0, "nan": np.nan, "infinite": np.inf}
 FIRST = "flyer_impedance"

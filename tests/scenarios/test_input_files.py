@@ -15,10 +15,10 @@ from handover.cosim.fmu.file.description import describe_fmu
 from handover.fmus.contents.reference_experiment import read_stimulus
 from handover.plants.free_flyer.hand.hand_track import read_track
 from handover.scenarios.cli.config_file import read_config
-from handover.scenarios.execution.input_file import read_inputs
-from handover.scenarios.results.run_folder import write_whole
+from handover.scenarios.robots.vsl.data_file import read_data
+from handover.scenarios.runs.execution.input_file import read_inputs
+from handover.scenarios.runs.results.run_folder import write_whole
 from handover.scenarios.study.plan.plan import read_plan
-from handover.scenarios.vsl.data_file import read_data
 
 READERS: dict[str, Callable[[Path], object]] = {
     "configuration": lambda file: read_config(file, click.Context(click.Command("run"))),

@@ -21,9 +21,9 @@ from support.campaigns import campaign_metadata, folder_of, table_of
 import handover
 from handover.scenarios import catalog
 from handover.scenarios.cli.command import main
-from handover.scenarios.film.film_page import film_content
 from handover.scenarios.live.watched_run import WatchedRun
-from handover.scenarios.results.run_folder import RunFolder, versions
+from handover.scenarios.pages.film.film_page import film_content
+from handover.scenarios.runs.results.run_folder import RunFolder, versions
 
 PLANTED = """
 from pathlib import Path

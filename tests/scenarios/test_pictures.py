@@ -10,7 +10,7 @@ import pytest
 from support.documentation import ROOT, TEXT
 
 from handover.cosim.blocks.ports import Floats
-from handover.scenarios.ir_grasp.plots import FINGER_COLOURS, FINGER_NAMES
+from handover.scenarios.robots.ir_grasp.plots import FINGER_COLOURS, FINGER_NAMES
 
 DOCS = ROOT / "docs"
 

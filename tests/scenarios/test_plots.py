@@ -18,7 +18,7 @@ from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.experiment.plotting import draw_time_figures, draw_time_plot
 from handover.scenarios.experiment.time_plot import COLOURS, Curve, TimePlot
-from handover.scenarios.reporting.time_plots import time_figure
+from handover.scenarios.runs.reporting.time_plots import time_figure
 
 SCENES = ("ir_grasp", "flyer_impedance", "vsl_hybrid")
 

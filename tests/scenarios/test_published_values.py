@@ -13,9 +13,9 @@ import handover.scenarios
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.experiment.paper import PublishedValue
 from handover.scenarios.experiment.parameters import parse_parameters
-from handover.scenarios.reporting.run_page import published_section
-from handover.scenarios.results.run_facts import RunFacts
-from handover.scenarios.results.run_folder import RunFolder
+from handover.scenarios.runs.reporting.run_page import published_section
+from handover.scenarios.runs.results.run_facts import RunFacts
+from handover.scenarios.runs.results.run_folder import RunFolder
 
 RUNS = (
     ("ir_grasp", (), 3),
@@ -61,7 +61,7 @@ def assert_published(folder: Path, scenario: str, given: tuple[str, ...], number
 @pytest.mark.parametrize("scenario", SCENARIOS)
 def test_every_published_value_is_in_the_paper_file(scenario: str):
     for value in values_of(scenario, ()):
-        file = Path(handover.scenarios.__file__).parent / value.paper / "paper.toml"
+        file = Path(handover.scenarios.__file__).parent / "robots" / value.paper / "paper.toml"
         entry: dict[str, Any] = tomli.loads(file.read_text(encoding="utf-8"))["published"][value.name]
         assert value.status == entry["status"]
         assert value.where == entry["where"]

@@ -10,7 +10,7 @@ from handover.cosim.record.reader import Record
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.experiment.replay import Body, Line
-from handover.scenarios.reporting.replay_section import phase_changes, replay_section
+from handover.scenarios.runs.reporting.replay_section import phase_changes, replay_section
 
 MUST_SHOW: dict[str, set[str]] = {
     "helix_handover": {"arm", "gripper", "hand", "ball", "cameras"},

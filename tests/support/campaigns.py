@@ -8,12 +8,12 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from handover.scenarios.campaign.campaign import run_campaign
-from handover.scenarios.campaign.folder import CampaignFolder
-from handover.scenarios.campaign.plan import CampaignPlan
-from handover.scenarios.campaign.plan_check import prepared
-from handover.scenarios.campaign.results import CampaignResults
-from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.runs.campaign.campaign import run_campaign
+from handover.scenarios.runs.campaign.folder import CampaignFolder
+from handover.scenarios.runs.campaign.plan import CampaignPlan
+from handover.scenarios.runs.campaign.plan_check import prepared
+from handover.scenarios.runs.campaign.results import CampaignResults
+from handover.scenarios.runs.campaign.table import CampaignTable
 from support.cosim.native_units import native_fmu
 from support.in_process_pool import InProcessPool
 

@@ -32,8 +32,8 @@ LOADED = (
     "handover.cosim.check.smoke_run",
     "handover.scenarios.cli.command",
     "handover.scenarios.cli.run",
-    "handover.scenarios.reporting.run_page",
-    "handover.scenarios.reporting.run_figures",
+    "handover.scenarios.runs.reporting.run_page",
+    "handover.scenarios.runs.reporting.run_figures",
     "handover.plants.helix.arm.tendon_arm",
     "handover.plants.ir_grasp.scene",
     "handover.controllers.helix.vision.handover_vision",
@@ -185,7 +185,7 @@ def _main(
     sys.stderr = open(2, "w", encoding="utf-8", buffering=1, closefd=False)  # noqa: SIM115
     sys.argv[:] = ["handover", *call]
     from handover.scenarios.cli.entry import main
-    from handover.scenarios.execution.supervisor import renew_heartbeat
+    from handover.scenarios.runs.execution.supervisor import renew_heartbeat
 
     renew_heartbeat()  # the one that was made as the module was loaded is shared with all other commands
     if before is not None:

@@ -6,9 +6,9 @@ import shutil
 from collections.abc import Callable, Generator, Sequence
 from pathlib import Path
 
-from handover.scenarios.campaign import pool_config
-from handover.scenarios.campaign.run_job import run_job
-from handover.scenarios.campaign.worker_pool import JobResult, RunJob
+from handover.scenarios.runs.campaign import pool_config
+from handover.scenarios.runs.campaign.run_job import run_job
+from handover.scenarios.runs.campaign.worker_pool import JobResult, RunJob
 
 
 class InProcessPool:

@@ -57,7 +57,7 @@ def servers(process: int) -> list[int]:
 
     def named(process: int) -> bool:
         with contextlib.suppress(ProcessLookupError, FileNotFoundError):
-            return b"handover.scenarios.campaign.run_server" in Path(f"/proc/{process}/cmdline").read_bytes()
+            return b"handover.scenarios.runs.campaign.run_server" in Path(f"/proc/{process}/cmdline").read_bytes()
         return False
 
     return [child for above in (process, *family(process)) if not named(above) for child in children(above)

@@ -8,7 +8,7 @@ from typing import Any
 
 import psutil
 
-from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.runs.campaign.table import CampaignTable
 from support.commands import Command, Ended
 
 SweepProcess = Command

@@ -10,7 +10,10 @@ from handover.cosim.blocks.ports import parameter
 from handover.cosim.blocks.start_values import parameter_faults
 from handover.cosim.blocks.units import Metre, MetrePerSecond, Pixel, RadianPerSecond
 
-_CORNER_SHIFT, _EDGE_SHIFT = 0.24, -0.005  # px; as scenarios/helix/calibrate_detector.py estimates them from pictures
+_CORNER_SHIFT, _EDGE_SHIFT = (
+    0.24,
+    -0.005,
+)  # px, by scenarios/robots/helix/calibrate_detector.py
 
 
 class InvalidVisionParameters(InvalidParameters):
@@ -56,7 +59,7 @@ class Params(CamerasAndMarkers):
         "how far refined corners lie inside of the printed ones, along the diagonal",
         minimum=-2.0,
         maximum=2.0,
-        origin=derived("python -m handover.scenarios.helix.calibrate_detector"),
+        origin=derived("python -m handover.scenarios.robots.helix.calibrate_detector"),
     )
     outline_noise: Pixel = parameter(
         0.08,
@@ -70,7 +73,7 @@ class Params(CamerasAndMarkers):
         "mean shift of the ball's edge outwards",
         minimum=-3.0,
         maximum=3.0,
-        origin=derived("python -m handover.scenarios.helix.calibrate_detector"),
+        origin=derived("python -m handover.scenarios.robots.helix.calibrate_detector"),
     )
     edge_doubt: Pixel = parameter(
         0.04,

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import click
 
-from handover.scenarios.execution.errors import UsageError, one_line_errors
-from handover.scenarios.results.run_folder import RunFolder, check_place, make_folder_of, replacing
+from handover.scenarios.runs.execution.errors import UsageError, one_line_errors
+from handover.scenarios.runs.results.run_folder import RunFolder, check_place, make_folder_of, replacing
 
 _PATH = click.Path(path_type=Path)
 _SIGNALS = ("person.p_WH_goal", "person.q_WH_goal", "person.finger_goal", "person.closed_goal")

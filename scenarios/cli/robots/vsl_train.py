@@ -24,15 +24,21 @@ from handover.fmus.binaries import NotCompiled
 from handover.fmus.build import cached
 from handover.fmus.compile import CompilationError, UnknownPlatform
 from handover.scenarios.cli.options import SEED, WholeNumber
-from handover.scenarios.execution.errors import UsageError, require_extra
-from handover.scenarios.execution.interruption import Interruption
-from handover.scenarios.execution.progress import progress_bar
-from handover.scenarios.results.run_folder import InvalidRunFolder, check_place, make_folder_of, replacing, write_whole
-from handover.scenarios.vsl.data_file import InvalidData, read_data, write_data
-from handover.scenarios.vsl.learning_curve import curve_table, draw_curve, learning_curve
-from handover.scenarios.vsl.residuals import Errors
-from handover.scenarios.vsl.training import MIN_POINTS, NothingToLearn, Progress, VslTraining
-from handover.scenarios.vsl.training_data import LEAST_SPAN, RADII, Measured, describe_arm, measured_reach
+from handover.scenarios.robots.vsl.data_file import InvalidData, read_data, write_data
+from handover.scenarios.robots.vsl.learning_curve import curve_table, draw_curve, learning_curve
+from handover.scenarios.robots.vsl.residuals import Errors
+from handover.scenarios.robots.vsl.training import MIN_POINTS, NothingToLearn, Progress, VslTraining
+from handover.scenarios.robots.vsl.training_data import LEAST_SPAN, RADII, Measured, describe_arm, measured_reach
+from handover.scenarios.runs.execution.errors import UsageError, require_extra
+from handover.scenarios.runs.execution.interruption import Interruption
+from handover.scenarios.runs.execution.progress import progress_bar
+from handover.scenarios.runs.results.run_folder import (
+    InvalidRunFolder,
+    check_place,
+    make_folder_of,
+    replacing,
+    write_whole,
+)
 
 _PATH = click.Path(path_type=Path)
 

@@ -10,9 +10,9 @@ from handover.cosim.exceptions import counted, first_faults
 from handover.cosim.files import FileTaken
 from handover.scenarios.cli.command import DeferredCommand, DeferringGroup
 from handover.scenarios.cli.console import open_console, print_json, print_rows
-from handover.scenarios.execution.errors import UsageError, one_line_errors
-from handover.scenarios.execution.progress import say
-from handover.scenarios.results.run_folder import check_place, make_folder_of, write_whole
+from handover.scenarios.runs.execution.errors import UsageError, one_line_errors
+from handover.scenarios.runs.execution.progress import say
+from handover.scenarios.runs.results.run_folder import check_place, make_folder_of, write_whole
 
 if TYPE_CHECKING:
     from handover.scenarios.study.plan.plan import StudyPlan

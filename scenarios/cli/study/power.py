@@ -10,7 +10,7 @@ from rich.table import Table
 from handover.scenarios.cli.console import open_console, print_json
 from handover.scenarios.cli.options import SEED, FiniteRange
 from handover.scenarios.cli.study.group import checked_plan
-from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
+from handover.scenarios.runs.execution.errors import UsageError, one_line_errors, require_extra
 
 if TYPE_CHECKING:
     from handover.scenarios.study.statistics.power import Power, Share

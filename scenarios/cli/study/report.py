@@ -9,9 +9,9 @@ import click
 
 from handover.cosim.exceptions import visible
 from handover.scenarios.cli.options import page_to_write
-from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
-from handover.scenarios.execution.progress import doing, say
-from handover.scenarios.results.run_folder import RunFolder, check_place
+from handover.scenarios.runs.execution.errors import UsageError, one_line_errors, require_extra
+from handover.scenarios.runs.execution.progress import doing, say
+from handover.scenarios.runs.results.run_folder import RunFolder, check_place
 
 if TYPE_CHECKING:
     from handover.scenarios.study.folder.session_folder import SessionFolder
@@ -99,8 +99,8 @@ def replay(folder: Path, participant: str, number: int, *, check: bool) -> None:
         if not run.is_there:
             raise UsageError(f"{run.path} has no record of a run to be shown")
         require_extra("reports", "the page")
-        from handover.scenarios.execution.resume import complete_signals
-        from handover.scenarios.reporting.run_page import write_run_page
+        from handover.scenarios.runs.execution.resume import complete_signals
+        from handover.scenarios.runs.reporting.run_page import write_run_page
 
         with run.held():
             complete_signals(run)

@@ -7,8 +7,8 @@ from pathlib import Path
 import click
 
 from handover.scenarios.cli.options import FiniteRange
-from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
-from handover.scenarios.execution.progress import say
+from handover.scenarios.runs.execution.errors import UsageError, one_line_errors, require_extra
+from handover.scenarios.runs.execution.progress import say
 
 _HELP = """Carry out the study of PLAN.toml on this computer: a page, one participant after the other.
 

@@ -10,13 +10,13 @@ from rich.table import Table
 from rich.text import Text
 
 from handover.cosim.exceptions import counted
-from handover.scenarios.campaign.folder import CampaignFolder
-from handover.scenarios.campaign.results import CampaignResults, PointResults
-from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.campaign.worker_pool import RunCounts
 from handover.scenarios.cli.campaign import format_progress
 from handover.scenarios.cli.console import heading, open_console
 from handover.scenarios.experiment.display_unit import display_unit
+from handover.scenarios.runs.campaign.folder import CampaignFolder
+from handover.scenarios.runs.campaign.results import CampaignResults, PointResults
+from handover.scenarios.runs.campaign.table import CampaignTable
+from handover.scenarios.runs.campaign.worker_pool import RunCounts
 
 _MAX_POINTS = 12
 _MAX_REASONS = 5

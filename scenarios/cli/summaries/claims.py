@@ -5,8 +5,6 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from handover.scenarios.campaign.folder import CampaignFolder
-from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.cli.console import open_console
 from handover.scenarios.cli.summaries.campaign import print_reasons
 from handover.scenarios.published.published_experiment import (
@@ -17,6 +15,8 @@ from handover.scenarios.published.published_experiment import (
     Verdict,
     verdict_counts,
 )
+from handover.scenarios.runs.campaign.folder import CampaignFolder
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 _STYLES = {Verdict.REPRODUCED: "bold green", Verdict.NOT_REPRODUCED: "bold red", Verdict.NOT_COMPARABLE: "bold"}
 

@@ -8,7 +8,8 @@ from rich.text import Text
 
 from handover.cosim.exceptions import counted
 from handover.scenarios.cli.console import heading, open_console
-from handover.scenarios.comparison.campaigns import (
+from handover.scenarios.experiment.display_unit import display_unit
+from handover.scenarios.pages.comparison.campaigns import (
     EVERY,
     ComparedCampaigns,
     MetricTest,
@@ -17,9 +18,8 @@ from handover.scenarios.comparison.campaigns import (
     remarks_on_metrics,
     success_tests,
 )
-from handover.scenarios.comparison.page import Comparison, RunComparison
-from handover.scenarios.experiment.display_unit import display_unit
-from handover.scenarios.results.run_folder import RunFolder
+from handover.scenarios.pages.comparison.page import Comparison, RunComparison
+from handover.scenarios.runs.results.run_folder import RunFolder
 
 _MAX_ROWS = 24
 

@@ -12,16 +12,16 @@ import click
 from handover.cosim.exceptions import RecordNotWritten, counted
 from handover.cosim.fmu.heartbeat import Heartbeat
 from handover.scenarios.cli.console import open_console, print_rows
-from handover.scenarios.execution.child_process import ChildEnd
-from handover.scenarios.execution.crash import Crash
-from handover.scenarios.execution.exit_status import UNIT_FAILED, status_of_run
-from handover.scenarios.execution.progress import doing, say
 from handover.scenarios.experiment.experiment import Outcome
-from handover.scenarios.results.run_folder import RunFolder, disk_errors_reported
-from handover.scenarios.results.summary import RunResult
-from handover.scenarios.results.tables import format_conversion, headline_rows, pace_rows, warning_lines
-from handover.scenarios.results.task import Task
-from handover.scenarios.results.tolerated_faults import ToleratedFaults
+from handover.scenarios.runs.execution.child_process import ChildEnd
+from handover.scenarios.runs.execution.crash import Crash
+from handover.scenarios.runs.execution.exit_status import UNIT_FAILED, status_of_run
+from handover.scenarios.runs.execution.progress import doing, say
+from handover.scenarios.runs.results.run_folder import RunFolder, disk_errors_reported
+from handover.scenarios.runs.results.summary import RunResult
+from handover.scenarios.runs.results.tables import format_conversion, headline_rows, pace_rows, warning_lines
+from handover.scenarios.runs.results.task import Task
+from handover.scenarios.runs.results.tolerated_faults import ToleratedFaults
 
 _MAX_CONVERSIONS = 8
 """Conversions of physical units that are listed at the end of a run."""
@@ -168,7 +168,7 @@ def _report_concluded(folder: RunFolder) -> None:
 
 def _write_page(folder: RunFolder) -> None:
     """Write the page of a run that crashed, and print what could not be shown in it."""
-    from handover.scenarios.reporting.run_page import write_run_page  # its plots take long to load
+    from handover.scenarios.runs.reporting.run_page import write_run_page  # its plots take long to load
 
     faults = ToleratedFaults()
     with disk_errors_reported(folder.path), faults.tolerated("the report could not be written"):

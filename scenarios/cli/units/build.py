@@ -30,12 +30,12 @@ from handover.fmus.layout import DuplicateName
 from handover.fmus.sources import FileElsewhere, beside_block, closure
 from handover.fmus.standalone.freezer import CannotFreeze, check_standalone
 from handover.scenarios.catalog import search_folder
-from handover.scenarios.execution.errors import UsageError, one_line_errors
-from handover.scenarios.execution.interruption import Interruption
-from handover.scenarios.execution.progress import doing, say
-from handover.scenarios.execution.selection import python_file_fault
 from handover.scenarios.experiment.parameter_sets import parameter_sets
-from handover.scenarios.results.run_folder import InvalidRunFolder, check_place
+from handover.scenarios.runs.execution.errors import UsageError, one_line_errors
+from handover.scenarios.runs.execution.interruption import Interruption
+from handover.scenarios.runs.execution.progress import doing, say
+from handover.scenarios.runs.execution.selection import python_file_fault
+from handover.scenarios.runs.results.run_folder import InvalidRunFolder, check_place
 
 
 def load_user_block(path: str, step: str | None) -> Entry:

@@ -17,11 +17,11 @@ from handover.cosim.fmu.file.archive import NO_FILE_FAULT
 from handover.cosim.probe.finding import Finding, Level
 from handover.cosim.ssp.check_ssp import check_ssp
 from handover.scenarios.cli.console import open_console
-from handover.scenarios.execution.errors import UsageError
-from handover.scenarios.execution.fmu_run import is_fmu
-from handover.scenarios.execution.progress import doing
-from handover.scenarios.execution.selection import folder_fault
-from handover.scenarios.execution.ssp_run import is_ssp
+from handover.scenarios.runs.execution.errors import UsageError
+from handover.scenarios.runs.execution.fmu_run import is_fmu
+from handover.scenarios.runs.execution.progress import doing
+from handover.scenarios.runs.execution.selection import folder_fault
+from handover.scenarios.runs.execution.ssp_run import is_ssp
 
 _FAULTS = 1
 _MAX_FINDINGS = 20  # of one level in one section

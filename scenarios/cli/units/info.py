@@ -15,10 +15,10 @@ from handover.cosim.ssp.ssp_file import SspFile
 from handover.cosim.system.system import System
 from handover.scenarios.cli.console import open_console, print_json, print_rows
 from handover.scenarios.cli.summaries.port_tables import port_rows, variable_data
-from handover.scenarios.execution.errors import UsageError, one_line_errors
-from handover.scenarios.execution.fmu_run import is_fmu
-from handover.scenarios.execution.selection import folder_fault, nothing_at
-from handover.scenarios.execution.ssp_run import is_ssp
+from handover.scenarios.runs.execution.errors import UsageError, one_line_errors
+from handover.scenarios.runs.execution.fmu_run import is_fmu
+from handover.scenarios.runs.execution.selection import folder_fault, nothing_at
+from handover.scenarios.runs.execution.ssp_run import is_ssp
 
 _HELP = """Show what is in FILE, an FMU (2.0 or 3.0, co-simulation) or an SSP: names, steps, capabilities, parameters,
 inputs, outputs and terminals; of an SSP its units, parameters and connections. Nothing is loaded or run; `handover

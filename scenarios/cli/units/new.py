@@ -13,9 +13,9 @@ from handover.cosim.files import FileTaken
 from handover.fmus.catalog import UNITS
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.cli.units.place_start import start_for
-from handover.scenarios.execution.errors import UsageError, one_line_errors
-from handover.scenarios.execution.progress import say
-from handover.scenarios.results.run_folder import check_place, make_folder_of, write_whole
+from handover.scenarios.runs.execution.errors import UsageError, one_line_errors
+from handover.scenarios.runs.execution.progress import say
+from handover.scenarios.runs.results.run_folder import check_place, make_folder_of, write_whole
 
 _TEMPLATES = Path(__file__).parent / "templates"
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")

@@ -16,9 +16,9 @@ import numpy as np
 from handover.cosim.blocks.variable import Causality, Kind, Variable
 from handover.fmus.catalog import import_class
 from handover.scenarios.cli.list import checked_ports_of_place, own_unit_of_place
-from handover.scenarios.execution.errors import UsageError
-from handover.scenarios.execution.selection import find_scenario
 from handover.scenarios.experiment.places import PlacePort
+from handover.scenarios.runs.execution.errors import UsageError
+from handover.scenarios.runs.execution.selection import find_scenario
 
 _WIDTH = 118
 _MOST_ENTRIES = 16

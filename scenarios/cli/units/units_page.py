@@ -13,8 +13,8 @@ from handover.fmus.contents.documentation import seconds
 from handover.fmus.contents.icons import InvalidIcon, block_icon
 from handover.scenarios.catalog import SYSTEMS
 from handover.scenarios.cli.summaries.port_tables import port_rows
-from handover.scenarios.reporting.html import picture_source, rows_table
-from handover.scenarios.reporting.page import Section, template, write_page
+from handover.scenarios.runs.reporting.html import picture_source, rows_table
+from handover.scenarios.runs.reporting.page import Section, template, write_page
 
 _COLUMNS = ("name", "type", "start", "range", "description")
 

@@ -8,13 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from handover.scenarios.campaign.plan import CampaignPlan
-from handover.scenarios.campaign.statistics import success_interval
-from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import COLOURS
-from handover.scenarios.free_flyer.handover.handovers import HandoverOfTask
-from handover.scenarios.free_flyer.parameters import Behaviour
 from handover.scenarios.published.claims import Statement
 from handover.scenarios.published.figures import Mark, Panel, drawn, strip, upright
 from handover.scenarios.published.free_flyer.handovers import (
@@ -32,6 +27,11 @@ from handover.scenarios.published.free_flyer.handovers import (
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment
 from handover.scenarios.published.runs import Runs, is_known
 from handover.scenarios.published.tables import number, table_of
+from handover.scenarios.robots.free_flyer.handover.handovers import HandoverOfTask
+from handover.scenarios.robots.free_flyer.parameters import Behaviour
+from handover.scenarios.runs.campaign.plan import CampaignPlan
+from handover.scenarios.runs.campaign.statistics import success_interval
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 _STOP = Fraction(36)
 """When a run ends, s: the robot has then waited for ten seconds or more."""

@@ -7,12 +7,8 @@ from pathlib import Path
 from typing import ClassVar
 
 from handover.plants.free_flyer.robot.thrusters import Params as ThrustersParams
-from handover.scenarios.campaign.plan import CampaignPlan
-from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import COLOURS
-from handover.scenarios.free_flyer.handover.handovers import HandoverOfTask
-from handover.scenarios.free_flyer.parameters import Behaviour, Propulsion, Task
 from handover.scenarios.published.claims import Statement
 from handover.scenarios.published.figures import Bars, Panel, drawn
 from handover.scenarios.published.free_flyer.handovers import (
@@ -29,6 +25,10 @@ from handover.scenarios.published.published_experiment import Claim, ComparisonT
 from handover.scenarios.published.runs import Point, Runs, is_done, is_known
 from handover.scenarios.published.tables import table_of
 from handover.scenarios.published.verdicts import every_claim, format_rate
+from handover.scenarios.robots.free_flyer.handover.handovers import HandoverOfTask
+from handover.scenarios.robots.free_flyer.parameters import Behaviour, Propulsion, Task
+from handover.scenarios.runs.campaign.plan import CampaignPlan
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 CONTROLLERS = {"ImpedanceController": "impedance", "AdmittanceController": "admittance", "PoseController": "PID"}
 """What takes the place, and its name in words."""

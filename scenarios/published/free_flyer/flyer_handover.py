@@ -8,12 +8,8 @@ from typing import ClassVar
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
-from handover.scenarios.campaign.plan import CampaignPlan
-from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
-from handover.scenarios.free_flyer.handover.handovers import HandoverOfTask
-from handover.scenarios.free_flyer.parameters import Behaviour, Propulsion, Task, TaskParameters
 from handover.scenarios.published.claims import Statement
 from handover.scenarios.published.free_flyer.flyer_handover_figures import draw_handovers, figure_number
 from handover.scenarios.published.free_flyer.handovers import (
@@ -35,6 +31,10 @@ from handover.scenarios.published.published_experiment import Claim, ComparisonT
 from handover.scenarios.published.runs import Point, Runs, is_done, is_known
 from handover.scenarios.published.tables import number, of, span, table_of
 from handover.scenarios.published.verdicts import every_claim
+from handover.scenarios.robots.free_flyer.handover.handovers import HandoverOfTask
+from handover.scenarios.robots.free_flyer.parameters import Behaviour, Propulsion, Task, TaskParameters
+from handover.scenarios.runs.campaign.plan import CampaignPlan
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 THRUSTS = (Propulsion.IDEAL, Propulsion.LIMITED, Propulsion.NOZZLES)
 """The thesis's pushes need the first; Astrobee's limits are those of each axis, or of twelve nozzles that share."""

@@ -15,12 +15,12 @@ from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import COLOURS, draw_time_figures
 from handover.scenarios.experiment.time_plot import TimeFigure, TimePlot
-from handover.scenarios.free_flyer.handover.handover_plots import figures_of_handover
-from handover.scenarios.free_flyer.parameters import Behaviour, HandoverParameters, Propulsion, Task
 from handover.scenarios.published.figures import SOFT, Drawable, Mark, Panel, drawn, level, records_of, strips
 from handover.scenarios.published.free_flyer.handovers import EXCHANGES, GIVING, TASKS, Variation
 from handover.scenarios.published.free_flyer.linear_model import linear_loop
 from handover.scenarios.published.runs import Runs
+from handover.scenarios.robots.free_flyer.handover.handover_plots import figures_of_handover
+from handover.scenarios.robots.free_flyer.parameters import Behaviour, HandoverParameters, Propulsion, Task
 
 _FIGURES = {
     (Task.ROBOT_TO_HUMAN, Behaviour.RIGID): (29, 30),

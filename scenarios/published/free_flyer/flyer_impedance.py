@@ -11,14 +11,9 @@ from matplotlib.axes import Axes
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
-from handover.scenarios.campaign.plan import CampaignPlan
-from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import COLOURS
-from handover.scenarios.free_flyer.parameters import Axis, Behaviour, ImpedanceParameters, Propulsion, Wrench
-from handover.scenarios.free_flyer.push.impedance import FlyerImpedance
-from handover.scenarios.free_flyer.push.impedance_evaluation import Errors, Motion, errors_of
 from handover.scenarios.published.claims import Statement
 from handover.scenarios.published.figures import SOFT, Drawable, Mark, Panel, drawn, level, records_of
 from handover.scenarios.published.free_flyer.handovers import EXACT, Variation, factor_of, published, unfinished_note
@@ -26,6 +21,11 @@ from handover.scenarios.published.free_flyer.linear_model import PUSHES, Push, p
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment
 from handover.scenarios.published.runs import Point, Row, Runs, is_done, is_known
 from handover.scenarios.published.tables import table_of
+from handover.scenarios.robots.free_flyer.parameters import Axis, Behaviour, ImpedanceParameters, Propulsion, Wrench
+from handover.scenarios.robots.free_flyer.push.impedance import FlyerImpedance
+from handover.scenarios.robots.free_flyer.push.impedance_evaluation import Errors, Motion, errors_of
+from handover.scenarios.runs.campaign.plan import CampaignPlan
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 DURATIONS = (0.1, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 12.0, 20.0)
 """How long forces last whose ratio of compliant to rigid errors is looked at, s."""

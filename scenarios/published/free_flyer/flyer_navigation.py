@@ -14,14 +14,8 @@ from handover.controllers.free_flyer.handover_parameters import Params as Decisi
 from handover.controllers.free_flyer.sampled_loop import largest_stable
 from handover.cosim.blocks.ports import Floats
 from handover.plants.free_flyer.robot.thrusters import Params as ThrustersParams
-from handover.scenarios.campaign.plan import CampaignPlan
-from handover.scenarios.campaign.statistics import LEVEL, success_interval, two_proportions
-from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import COLOURS
-from handover.scenarios.free_flyer.handover.handovers import HandoverOfTask
-from handover.scenarios.free_flyer.handover.person_evaluation import Cause
-from handover.scenarios.free_flyer.parameters import Behaviour, Task
 from handover.scenarios.published.claims import Statement
 from handover.scenarios.published.figures import Mark, Panel, drawn
 from handover.scenarios.published.free_flyer.handovers import (
@@ -46,6 +40,12 @@ from handover.scenarios.published.verdicts import (
     format_rate,
     format_share,
 )
+from handover.scenarios.robots.free_flyer.handover.handovers import HandoverOfTask
+from handover.scenarios.robots.free_flyer.handover.person_evaluation import Cause
+from handover.scenarios.robots.free_flyer.parameters import Behaviour, Task
+from handover.scenarios.runs.campaign.plan import CampaignPlan
+from handover.scenarios.runs.campaign.statistics import LEVEL, success_interval, two_proportions
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 _REPETITIONS = 3
 _MIN_RUNS, _MIN_LATE = 20, 4

@@ -12,18 +12,18 @@ from handover.controllers.free_flyer.sampled_loop import largest_stable
 from handover.cosim.exceptions import counted
 from handover.cosim.stepping.options import Algorithm, MasterOptions
 from handover.plants.free_flyer.robot.thrusters import Params as ThrustersParams
-from handover.scenarios.campaign.plan import CampaignPlan
-from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import COLOURS
-from handover.scenarios.free_flyer.parameters import Behaviour
-from handover.scenarios.free_flyer.push.impedance import FlyerImpedance
 from handover.scenarios.published.claims import Statement
 from handover.scenarios.published.figures import Mark, Panel, drawn
 from handover.scenarios.published.free_flyer.linear_model import linear_loop
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment
 from handover.scenarios.published.runs import is_done
 from handover.scenarios.published.tables import table_of
+from handover.scenarios.robots.free_flyer.parameters import Behaviour
+from handover.scenarios.robots.free_flyer.push.impedance import FlyerImpedance
+from handover.scenarios.runs.campaign.plan import CampaignPlan
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 _STEPS = (0.001, 0.002, 0.004, 0.008, 0.016)
 """Communication steps of a host that steps all units in parallel, s."""

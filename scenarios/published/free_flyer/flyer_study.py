@@ -12,20 +12,8 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from handover.cosim.blocks.ports import Floats
-from handover.scenarios.campaign.plan import CampaignPlan
-from handover.scenarios.campaign.statistics import (
-    LEVEL,
-    RESAMPLES,
-    sign_flip_test,
-    success_interval,
-    two_proportions,
-)
-from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import COLOURS
-from handover.scenarios.free_flyer.handover.handovers import HandoverOfTask
-from handover.scenarios.free_flyer.handover.person_evaluation import Cause
-from handover.scenarios.free_flyer.parameters import Behaviour, Task
 from handover.scenarios.published.claims import Statement
 from handover.scenarios.published.figures import Drawable, Mark, Panel, drawn, level
 from handover.scenarios.published.free_flyer.handovers import STUDIED, TASKS, published_failures, unfinished_note
@@ -39,6 +27,18 @@ from handover.scenarios.published.verdicts import (
     format_share,
     rate_claim,
 )
+from handover.scenarios.robots.free_flyer.handover.handovers import HandoverOfTask
+from handover.scenarios.robots.free_flyer.handover.person_evaluation import Cause
+from handover.scenarios.robots.free_flyer.parameters import Behaviour, Task
+from handover.scenarios.runs.campaign.plan import CampaignPlan
+from handover.scenarios.runs.campaign.statistics import (
+    LEVEL,
+    RESAMPLES,
+    sign_flip_test,
+    success_interval,
+    two_proportions,
+)
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 SKILLS = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Of persons who are alike in all else."""

@@ -7,8 +7,8 @@ from handover.cosim.blocks.ports import Floats
 from handover.cosim.exceptions import counted
 from handover.plants.free_flyer.robot.navigation import Params as NavigationParams
 from handover.scenarios.experiment.paper import paper_values
-from handover.scenarios.free_flyer.parameters import Behaviour, Task
 from handover.scenarios.published.runs import Count, Point, Runs, is_done
+from handover.scenarios.robots.free_flyer.parameters import Behaviour, Task
 
 TASKS = {
     Task.ROBOT_TO_HUMAN: "robot to human",

@@ -11,8 +11,8 @@ from handover.controllers.free_flyer.ports import PERIOD
 from handover.controllers.free_flyer.ports import Behaviour as Gains
 from handover.controllers.free_flyer.sampled_loop import SampledLoop
 from handover.cosim.blocks.ports import Floats
-from handover.scenarios.free_flyer.parameters import Axis, Behaviour, ImpedanceParameters, Wrench
 from handover.scenarios.published.runs import Point
+from handover.scenarios.robots.free_flyer.parameters import Axis, Behaviour, ImpedanceParameters, Wrench
 
 _DEFAULT = ImpedanceParameters()
 _AFTER = 30.0

@@ -16,14 +16,9 @@ from scipy.stats import page_trend_test, ttest_ind_from_stats
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.exceptions import counted
-from handover.scenarios.campaign.plan import CampaignPlan
-from handover.scenarios.campaign.statistics import LEVEL, MIN_SAMPLES, RESAMPLES, Statistic, time_interval
-from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import COLOURS
-from handover.scenarios.helix.evaluation import FIG_9_RESOLUTION
-from handover.scenarios.helix.parameters import HandPlace, Tuning, settings_of
 from handover.scenarios.published.claims import Statement
 from handover.scenarios.published.figures import SOFT, Drawable, Mark, Panel, Spans, drawn
 from handover.scenarios.published.helix.helix_1_curves import (
@@ -47,6 +42,11 @@ from handover.scenarios.published.published_experiment import Claim, ComparisonT
 from handover.scenarios.published.runs import Point, Row, Runs, is_done
 from handover.scenarios.published.tables import number, of, span, table_of
 from handover.scenarios.published.verdicts import every_claim, format_median, format_p_value, ratio_interval
+from handover.scenarios.robots.helix.evaluation import FIG_9_RESOLUTION
+from handover.scenarios.robots.helix.parameters import HandPlace, Tuning, settings_of
+from handover.scenarios.runs.campaign.plan import CampaignPlan
+from handover.scenarios.runs.campaign.statistics import LEVEL, MIN_SAMPLES, RESAMPLES, Statistic, time_interval
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 _SETUP = paper_values("helix", "experiment")
 ALPHAS: Sequence[float] = _SETUP["alpha"]

@@ -22,16 +22,16 @@ from handover.controllers.helix.servo.visual_servo import Phase
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.exceptions import counted
 from handover.cosim.record.reader import Record
-from handover.scenarios.campaign.statistics import LEVEL, MIN_SAMPLES, success_interval, time_interval
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import COLOURS
-from handover.scenarios.helix.evaluation import FIG_9_RESOLUTION
 from handover.scenarios.published.claims import Statement
 from handover.scenarios.published.figures import SOFT, Band, Drawable, Mark, Panel, drawn, level, records_of, upright
 from handover.scenarios.published.published_experiment import Claim
 from handover.scenarios.published.runs import Row, Runs
 from handover.scenarios.published.verdicts import MIN_FOR_EVERY, format_p_value, format_rate
+from handover.scenarios.robots.helix.evaluation import FIG_9_RESOLUTION
+from handover.scenarios.runs.campaign.statistics import LEVEL, MIN_SAMPLES, success_interval, time_interval
 
 _PRINTED = paper_values("helix", "published")
 _BOUND = float(paper_values("helix", "thesis")["epsilon_pose_bound"])

@@ -13,7 +13,6 @@ from scipy.stats import ttest_ind_from_stats
 
 from handover.cosim.blocks.ports import Floats
 from handover.plants.helix.arm.tendon_parameters import Params as ArmParams
-from handover.scenarios.campaign.statistics import LEVEL, MIN_SAMPLES
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import COLOURS
@@ -24,6 +23,7 @@ from handover.scenarios.published.published_experiment import Claim, ComparisonT
 from handover.scenarios.published.runs import Runs
 from handover.scenarios.published.tables import median_and_range, of, table_of
 from handover.scenarios.published.verdicts import format_p_value
+from handover.scenarios.runs.campaign.statistics import LEVEL, MIN_SAMPLES
 
 PRINTED = paper_values("helix", "published")
 

@@ -10,13 +10,9 @@ from scipy import stats
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.exceptions import counted
-from handover.scenarios.campaign.plan import CampaignPlan
-from handover.scenarios.campaign.statistics import LEVEL
-from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import COLOURS
-from handover.scenarios.helix.parameters import HandPlace, Tuning
 from handover.scenarios.published.claims import Statement
 from handover.scenarios.published.figures import Mark, Panel, drawn, records_of
 from handover.scenarios.published.helix.helix_1_curves import error_marks, errors_of
@@ -24,6 +20,10 @@ from handover.scenarios.published.published_experiment import Claim, ComparisonT
 from handover.scenarios.published.runs import Runs
 from handover.scenarios.published.tables import median_and_range, number, of, table_of
 from handover.scenarios.published.verdicts import every_claim, format_p_value
+from handover.scenarios.robots.helix.parameters import HandPlace, Tuning
+from handover.scenarios.runs.campaign.plan import CampaignPlan
+from handover.scenarios.runs.campaign.statistics import LEVEL
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 _PATIENCE = 600.0
 """Time by which the gripper must begin to close, s, as in `helix-1`."""

@@ -11,19 +11,19 @@ from matplotlib.patches import Circle
 
 from handover.cosim.blocks.ports import Floats
 from handover.plants.helix.hand.partner_parameters import Holder
-from handover.scenarios.campaign.plan import CampaignPlan
-from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import COLOURS
-from handover.scenarios.helix.helix_use_case import UseCaseParameters
-from handover.scenarios.helix.parameters import HandPlace, Tuning
 from handover.scenarios.published.figures import Drawable, Mark, Panel, drawn, records_of
 from handover.scenarios.published.helix.helix_cases import reasons_of
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment
 from handover.scenarios.published.runs import Runs
 from handover.scenarios.published.tables import of, table_of
 from handover.scenarios.published.verdicts import every_claim, format_median
+from handover.scenarios.robots.helix.helix_use_case import UseCaseParameters
+from handover.scenarios.robots.helix.parameters import HandPlace, Tuning
+from handover.scenarios.runs.campaign.plan import CampaignPlan
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 _PATIENCE = 600.0
 """Time to reach the ball, and again to reach the bowl, s: as long as the scenario allows."""

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
-from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.published.claims import Statement
 from handover.scenarios.published.published_experiment import Claim, PublishedExperiment
 from handover.scenarios.published.runs import Runs
 from handover.scenarios.published.verdicts import MIN_FOR_EVERY
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 OFFERED_AT = [
     {"azimuth": azimuth, "radius": radius, "height": height}

@@ -9,8 +9,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from handover.scenarios.campaign.plan import CampaignPlan
-from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import COLOURS
@@ -28,6 +26,8 @@ from handover.scenarios.published.published_experiment import Claim, ComparisonT
 from handover.scenarios.published.runs import Runs
 from handover.scenarios.published.tables import number, of, table_of
 from handover.scenarios.published.verdicts import every_claim
+from handover.scenarios.runs.campaign.plan import CampaignPlan
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 _QUICK_PLACES, _QUICK_CASES = 1, ("nothing", "light", "arm's stiffness")
 

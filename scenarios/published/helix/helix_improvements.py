@@ -11,9 +11,6 @@ from scipy import stats
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.exceptions import counted
-from handover.scenarios.campaign.plan import CampaignPlan
-from handover.scenarios.campaign.statistics import LEVEL
-from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import COLOURS
 from handover.scenarios.published.claims import Statement
@@ -30,6 +27,9 @@ from handover.scenarios.published.published_experiment import Claim, ComparisonT
 from handover.scenarios.published.runs import Runs
 from handover.scenarios.published.tables import of, table_of
 from handover.scenarios.published.verdicts import format_p_value
+from handover.scenarios.runs.campaign.plan import CampaignPlan
+from handover.scenarios.runs.campaign.statistics import LEVEL
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 _RANDOM_PLACES, _SEED = 12, 54
 """Where the ball is offered besides: the thesis's settings miss some, and the paired test needs six pairs."""

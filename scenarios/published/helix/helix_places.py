@@ -6,13 +6,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from handover.scenarios.campaign.plan import CampaignPlan
-from handover.scenarios.campaign.statistics import success_interval
-from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import COLOURS
-from handover.scenarios.helix.workspace import random_place, reach
 from handover.scenarios.published.claims import Statement
 from handover.scenarios.published.figures import Mark, Panel, drawn
 from handover.scenarios.published.helix.helix_cases import reasons_of
@@ -20,6 +16,10 @@ from handover.scenarios.published.published_experiment import Claim, ComparisonT
 from handover.scenarios.published.runs import Runs
 from handover.scenarios.published.tables import table_of
 from handover.scenarios.published.verdicts import format_rate
+from handover.scenarios.robots.helix.workspace import random_place, reach
+from handover.scenarios.runs.campaign.plan import CampaignPlan
+from handover.scenarios.runs.campaign.statistics import success_interval
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 _COUNT, _QUICK_COUNT = 200, 3
 _SEED = 2016

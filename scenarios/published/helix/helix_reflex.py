@@ -8,9 +8,6 @@ import numpy as np
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.exceptions import counted
-from handover.scenarios.campaign.plan import CampaignPlan
-from handover.scenarios.campaign.statistics import LEVEL, paired_difference, paired_test
-from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import COLOURS
 from handover.scenarios.published.claims import Statement
@@ -27,6 +24,9 @@ from handover.scenarios.published.verdicts import (
     no_worse_claim,
     order_claim,
 )
+from handover.scenarios.runs.campaign.plan import CampaignPlan
+from handover.scenarios.runs.campaign.statistics import LEVEL, paired_difference, paired_test
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 _COUNT, _QUICK_COUNT = 40, 2
 _SEED = 1904

@@ -13,16 +13,16 @@ from matplotlib.colors import ListedColormap
 from handover.controllers.helix.servo.servo_parameters import Params as ServoParams
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.exceptions import counted
-from handover.scenarios.campaign.plan import CampaignPlan
-from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import COLOURS
-from handover.scenarios.helix.workspace import cameras_that_see, reach
 from handover.scenarios.published.claims import Statement
 from handover.scenarios.published.figures import Drawable, Mark, Panel, drawn
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment
 from handover.scenarios.published.runs import Row, is_done
 from handover.scenarios.published.tables import table_of
+from handover.scenarios.robots.helix.workspace import cameras_that_see, reach
+from handover.scenarios.runs.campaign.plan import CampaignPlan
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 AZIMUTHS = (0.0, 1.05, 1.57, 3.14, -1.57)
 """Directions from the axis, rad: along tendons, between two, and across."""

@@ -22,8 +22,8 @@ from handover.plants.ir_grasp.scene import Inputs as SceneInputs
 from handover.plants.ir_grasp.scene import Outputs as SceneOutputs
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import figure
-from handover.scenarios.ir_grasp.parameters import Parameters
-from handover.scenarios.ir_grasp.plots import FINGER_COLOURS, FINGER_NAMES, THING_COLOUR, draw_hand, draw_moment
+from handover.scenarios.robots.ir_grasp.parameters import Parameters
+from handover.scenarios.robots.ir_grasp.plots import FINGER_COLOURS, FINGER_NAMES, THING_COLOUR, draw_hand, draw_moment
 
 _EDGE, _SOFT, _ARROW = "#8a6d3b", "#4d5866", "#1b5fae"
 _MARGIN = 25.0

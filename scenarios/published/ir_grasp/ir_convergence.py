@@ -15,13 +15,7 @@ from handover.cosim.blocks.ports import Floats
 from handover.cosim.exceptions import counted
 from handover.cosim.record.reader import Record
 from handover.plants.ir_grasp.objects import SOLIDS
-from handover.scenarios.campaign.plan import CampaignPlan
-from handover.scenarios.campaign.statistics import success_interval
-from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
-from handover.scenarios.ir_grasp.evaluation import IN_COST
-from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
-from handover.scenarios.ir_grasp.plots import FINGER_COLOURS, FINGER_NAMES
 from handover.scenarios.published.claims import Statement
 from handover.scenarios.published.figures import Mark, Panel, drawn
 from handover.scenarios.published.ir_grasp.grasp_drawings import draw_cases, draw_poses, draw_sequences
@@ -30,6 +24,12 @@ from handover.scenarios.published.published_experiment import Claim, ComparisonT
 from handover.scenarios.published.runs import Runs
 from handover.scenarios.published.tables import table_of
 from handover.scenarios.published.verdicts import FEW, format_median, format_rate, format_share, min_trials_for
+from handover.scenarios.robots.ir_grasp.evaluation import IN_COST
+from handover.scenarios.robots.ir_grasp.ir_grasp import IrGrasp
+from handover.scenarios.robots.ir_grasp.plots import FINGER_COLOURS, FINGER_NAMES
+from handover.scenarios.runs.campaign.plan import CampaignPlan
+from handover.scenarios.runs.campaign.statistics import success_interval
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 _REPETITIONS = 16
 _NUMBERS = {False: "12", True: "13"}

@@ -10,12 +10,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from handover.cosim.exceptions import counted
-from handover.scenarios.campaign.plan import CampaignPlan
-from handover.scenarios.campaign.statistics import LEVEL, success_interval, time_interval
-from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import COLOURS
-from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
 from handover.scenarios.published.claims import Statement
 from handover.scenarios.published.figures import Drawable, Mark, Panel, drawn, level
 from handover.scenarios.published.ir_grasp.limits_axes import (
@@ -36,6 +32,10 @@ from handover.scenarios.published.published_experiment import Claim, ComparisonT
 from handover.scenarios.published.runs import Count, Point, Runs
 from handover.scenarios.published.tables import number, table_of, with_interval
 from handover.scenarios.published.verdicts import FEW, format_p_value, format_rate, format_share, min_trials_for
+from handover.scenarios.robots.ir_grasp.ir_grasp import IrGrasp
+from handover.scenarios.runs.campaign.plan import CampaignPlan
+from handover.scenarios.runs.campaign.statistics import LEVEL, success_interval, time_interval
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 _WITHOUT = tuple(arm for arm in ARMS if not arm.looks)
 _MIN_AXES = 4

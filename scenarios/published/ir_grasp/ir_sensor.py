@@ -10,25 +10,25 @@ import numpy as np
 from handover.controllers.ir_grasp.parameters import Params as ReflexParams
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.exceptions import counted
-from handover.scenarios.campaign.plan import CampaignPlan
-from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import COLOURS
-from handover.scenarios.ir_grasp.ir_sensor import AT, Finger, IrSensor
-from handover.scenarios.ir_grasp.plots import FINGER_COLOURS
-from handover.scenarios.ir_grasp.sensor_curve import (
-    Fit,
-    apparent_distance,
-    controller_curve,
-    readings_of,
-    time_of_flight,
-)
 from handover.scenarios.published.claims import Statement
 from handover.scenarios.published.figures import SOFT, Mark, Panel, drawn, level, records_of
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment
 from handover.scenarios.published.runs import Point, Row, Runs, is_done
 from handover.scenarios.published.tables import table_of
 from handover.scenarios.published.verdicts import format_share
+from handover.scenarios.robots.ir_grasp.ir_sensor import AT, Finger, IrSensor
+from handover.scenarios.robots.ir_grasp.plots import FINGER_COLOURS
+from handover.scenarios.robots.ir_grasp.sensor_curve import (
+    Fit,
+    apparent_distance,
+    controller_curve,
+    readings_of,
+    time_of_flight,
+)
+from handover.scenarios.runs.campaign.plan import CampaignPlan
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 REFLECTIVITIES = (0.2, 0.5, 0.8, 1.0, 1.5, 2.0)
 """Of faces, over that of the surface which the curve is of: 0.8 is the cup of the grasps, 1 the paper box."""

@@ -14,20 +14,9 @@ from handover.controllers.ir_grasp.ir_reflex import Stop
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.exceptions import counted
 from handover.plants.ir_grasp.objects import SOLIDS, Thing
-from handover.scenarios.campaign.plan import CampaignPlan
-from handover.scenarios.campaign.statistics import (
-    LEVEL,
-    paired_test,
-    success_interval,
-    time_interval,
-    two_proportions,
-)
-from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import COLOURS
-from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
-from handover.scenarios.ir_grasp.plots import FINGER_COLOURS, FINGER_NAMES
 from handover.scenarios.published.claims import Statement
 from handover.scenarios.published.figures import Mark, Panel, drawn
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment
@@ -45,6 +34,17 @@ from handover.scenarios.published.verdicts import (
     rate_claim,
     without_verdict,
 )
+from handover.scenarios.robots.ir_grasp.ir_grasp import IrGrasp
+from handover.scenarios.robots.ir_grasp.plots import FINGER_COLOURS, FINGER_NAMES
+from handover.scenarios.runs.campaign.plan import CampaignPlan
+from handover.scenarios.runs.campaign.statistics import (
+    LEVEL,
+    paired_test,
+    success_interval,
+    time_interval,
+    two_proportions,
+)
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 POSES: Mapping[bool, str] = {False: "nominal", True: "perturbed"}
 """By whether the object is moved after vision saw it."""

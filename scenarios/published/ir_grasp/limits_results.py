@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from handover.cosim.exceptions import counted
-from handover.scenarios.campaign.statistics import LEVEL, holm, sign_flip_test
 from handover.scenarios.published.ir_grasp.limits_axes import AXES, Axis, LimitArm, settings_of
 from handover.scenarios.published.runs import Count, Row, Runs, is_done, plain
+from handover.scenarios.runs.campaign.statistics import LEVEL, holm, sign_flip_test
 
 WORTH = 0.15
 """Difference of rates from which on sensing counts as worth something, or as costing something."""

@@ -12,10 +12,10 @@ from math import comb, inf
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
-from handover.scenarios.campaign.statistics import LEVEL
 from handover.scenarios.published.claims import Statement
 from handover.scenarios.published.published_experiment import Claim
 from handover.scenarios.published.verdicts import format_p_value
+from handover.scenarios.runs.campaign.statistics import LEVEL
 
 _NAMED = 5
 """Comparisons that are named where a claim fails."""

@@ -9,8 +9,6 @@ import numpy as np
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.exceptions import counted
-from handover.scenarios.campaign.plan import CampaignPlan
-from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import COLOURS
@@ -28,8 +26,10 @@ from handover.scenarios.published.vsl.path_traces import (
     traces_of,
 )
 from handover.scenarios.published.vsl.separation import Comparison, in_mm, separation_claim, spread_in_mm
-from handover.scenarios.vsl.parameters import BAR
-from handover.scenarios.vsl.path_experiments import VslModelBased
+from handover.scenarios.robots.vsl.parameters import BAR
+from handover.scenarios.robots.vsl.path_experiments import VslModelBased
+from handover.scenarios.runs.campaign.plan import CampaignPlan
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 _PUBLISHED = paper_values("vsl", "published")
 _SEED = 2020

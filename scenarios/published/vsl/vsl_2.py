@@ -14,8 +14,6 @@ from handover.controllers.vsl.hybrid_kinematics import Learned
 from handover.controllers.vsl.model_text import InvalidModel, read_model
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.exceptions import counted
-from handover.scenarios.campaign.plan import CampaignPlan
-from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import COLOURS
@@ -35,9 +33,11 @@ from handover.scenarios.published.vsl.path_traces import (
     traces_of,
 )
 from handover.scenarios.published.vsl.separation import Comparison, in_mm, separation_claim, spread_in_mm
-from handover.scenarios.vsl.parameters import BAR
-from handover.scenarios.vsl.path_experiments import VslHybrid
-from handover.scenarios.vsl.plots import draw_box
+from handover.scenarios.robots.vsl.parameters import BAR
+from handover.scenarios.robots.vsl.path_experiments import VslHybrid
+from handover.scenarios.robots.vsl.plots import draw_box
+from handover.scenarios.runs.campaign.plan import CampaignPlan
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 _PUBLISHED, _BEYOND = (paper_values("vsl", group) for group in ("published", "beyond"))
 _SEED = 2021

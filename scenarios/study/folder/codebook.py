@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from handover.scenarios.results.run_folder import disk_errors_reported, replacing, write_whole
+from handover.scenarios.runs.results.run_folder import disk_errors_reported, replacing, write_whole
 from handover.scenarios.study.plan.plan import DEVICES, StudyPlan
 
 PERSON, PILOT = "person", "scripted pilot"

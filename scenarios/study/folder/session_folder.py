@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from handover.cosim.typed_data import Count, NotNegative
-from handover.scenarios.results.run_folder import (
+from handover.scenarios.runs.results.run_folder import (
     InvalidRunFolder,
     check_place,
     disk_errors_reported,

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from handover.cosim.typed_data import Count
-from handover.scenarios.results.run_folder import disk_errors_reported, read_file, read_object, write_whole
+from handover.scenarios.runs.results.run_folder import disk_errors_reported, read_file, read_object, write_whole
 
 
 @dataclass(frozen=True)

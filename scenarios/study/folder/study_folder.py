@@ -12,7 +12,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 
 from handover.cosim.files import read_regular
-from handover.scenarios.results.run_folder import (
+from handover.scenarios.runs.results.run_folder import (
     InvalidRunFolder,
     RunFolder,
     check_no_links,

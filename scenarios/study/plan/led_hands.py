@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 from dataclasses import fields
 
-from handover.scenarios.execution.selection import find_scenario
 from handover.scenarios.experiment.live_inputs import LedHand
 from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters
+from handover.scenarios.runs.execution.selection import find_scenario
 from handover.scenarios.study.plan.plan import Condition, StudyPlan
 
 _CHOICE = "hand"

@@ -7,8 +7,8 @@ from pathlib import Path
 from markupsafe import Markup
 
 from handover.cosim.exceptions import counted
-from handover.scenarios.reporting.html import rows_table
-from handover.scenarios.reporting.page import Section, template, write_page
+from handover.scenarios.runs.reporting.html import rows_table
+from handover.scenarios.runs.reporting.page import Section, template, write_page
 from handover.scenarios.study.folder.codebook import PILOT
 from handover.scenarios.study.folder.session_folder import pseudonym_of
 from handover.scenarios.study.folder.study_folder import StudyFolder

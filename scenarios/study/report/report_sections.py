@@ -9,11 +9,11 @@ from markupsafe import Markup
 
 from handover.cosim.exceptions import counted
 from handover.scenarios.experiment.paper import paper_values
-from handover.scenarios.free_flyer.parameters import Behaviour, Task
 from handover.scenarios.published.free_flyer.handovers import STUDIED, published_failures
 from handover.scenarios.published.verdicts import format_interval, format_p_value, format_share
-from handover.scenarios.reporting.html import plot_html, rows_table
-from handover.scenarios.reporting.page import Section
+from handover.scenarios.robots.free_flyer.parameters import Behaviour, Task
+from handover.scenarios.runs.reporting.html import plot_html, rows_table
+from handover.scenarios.runs.reporting.page import Section
 from handover.scenarios.study.folder.codebook import PILOT
 from handover.scenarios.study.report.report_plots import ratings_figure, shifts_figure
 from handover.scenarios.study.statistics.analysis import FailureCount, StatementModel, StudyAnalysis

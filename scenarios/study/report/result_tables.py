@@ -5,7 +5,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from handover.scenarios.results.run_folder import disk_errors_reported, folder_within
+from handover.scenarios.runs.results.run_folder import disk_errors_reported, folder_within
 from handover.scenarios.study.folder.codebook import (
     NUMBER,
     PERSON,

@@ -10,11 +10,11 @@ import time
 from pathlib import Path
 
 from handover.cosim.master.live_control import LiveControl
-from handover.scenarios.execution.interruption import Interruption
-from handover.scenarios.execution.request import RunRequest
-from handover.scenarios.execution.runner import run_task
 from handover.scenarios.live.shared_inputs import SharedInputs
-from handover.scenarios.results.task import InputSources
+from handover.scenarios.runs.execution.interruption import Interruption
+from handover.scenarios.runs.execution.request import RunRequest
+from handover.scenarios.runs.execution.runner import run_task
+from handover.scenarios.runs.results.task import InputSources
 
 _GRACE = 5.0
 """Time that a run gets to end after its step, s."""

@@ -8,7 +8,7 @@ from handover.scenarios.study.plan.led_hands import led_hand_of
 from handover.scenarios.study.session.device_test import DeviceTest
 from handover.scenarios.study.session.trial import Trial
 
-PRACTICE = "handover.scenarios.free_flyer.handover.hand_practice:HandPractice"
+PRACTICE = "handover.scenarios.robots.free_flyer.handover.hand_practice:HandPractice"
 _LOST_FROM = 0.7
 """How far from its first place the object of the practice is lost, m; the practice then begins anew (assumed)."""
 _SHORTEST = 1.0

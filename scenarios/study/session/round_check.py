@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from handover.cosim.files import scratch_folder
 from handover.cosim.record.reader import Record
-from handover.scenarios.execution.input_sources import played_back
-from handover.scenarios.execution.interruption import Interruption
-from handover.scenarios.execution.request import RunRequest
-from handover.scenarios.execution.runner import run_task
-from handover.scenarios.results.run_facts import elements_of, whole_record_of
-from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder, version_differences, versions
+from handover.scenarios.runs.execution.input_sources import played_back
+from handover.scenarios.runs.execution.interruption import Interruption
+from handover.scenarios.runs.execution.request import RunRequest
+from handover.scenarios.runs.execution.runner import run_task
+from handover.scenarios.runs.results.run_facts import elements_of, whole_record_of
+from handover.scenarios.runs.results.run_folder import InvalidRunFolder, RunFolder, version_differences, versions
 from handover.scenarios.study.folder.session_folder import SessionFolder
 from handover.scenarios.study.plan.led_hands import round_parameters
 from handover.scenarios.study.plan.order import Round

@@ -41,7 +41,7 @@ from handover.scenarios.live.connections import (
     too_many,
 )
 from handover.scenarios.live.hand_messages import DeviceClock, InvalidHandMessage, Stamp
-from handover.scenarios.results.run_folder import InvalidRunFolder
+from handover.scenarios.runs.results.run_folder import InvalidRunFolder
 from handover.scenarios.study.folder.session_folder import RoundRecord
 from handover.scenarios.study.plan.led_hands import round_parameters
 from handover.scenarios.study.plan.order import Round

@@ -23,9 +23,9 @@ from starlette.websockets import WebSocket
 from handover.scenarios.live.connections import HEADERS, POLICY_VIOLATION, is_same_origin
 from handover.scenarios.live.serving import PageServer
 from handover.scenarios.live.webcam import WEBCAM_SCRIPTS, WebcamFiles
-from handover.scenarios.reporting.html import json_html
-from handover.scenarios.reporting.page import asset, plain_page_html, template
-from handover.scenarios.reporting.replay_section import SCENE_SCRIPTS
+from handover.scenarios.runs.reporting.html import json_html
+from handover.scenarios.runs.reporting.page import asset, plain_page_html, template
+from handover.scenarios.runs.reporting.replay_section import SCENE_SCRIPTS
 from handover.scenarios.study.plan.plan import StudyPlan
 from handover.scenarios.study.session.page_messages import LONGEST
 from handover.scenarios.study.session.seat import StudySeat

@@ -20,16 +20,16 @@ from handover.cosim.master.live_control import LiveControl
 from handover.cosim.python_process import module_command
 from handover.cosim.record.reader import Record
 from handover.scenarios.catalog import scenario_of
-from handover.scenarios.execution.selection import find_scenario
 from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.experiment.replay import Line
 from handover.scenarios.live.hand_messages import HandStream, hand_sample, hand_start
 from handover.scenarios.live.live_scene import LiveScene
 from handover.scenarios.live.shared_inputs import SharedInputs
 from handover.scenarios.live.watched_run import WatchedRun
-from handover.scenarios.results.run_facts import whole_record_of
-from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
-from handover.scenarios.results.tolerated_faults import ToleratedFaults
+from handover.scenarios.runs.execution.selection import find_scenario
+from handover.scenarios.runs.results.run_facts import whole_record_of
+from handover.scenarios.runs.results.run_folder import InvalidRunFolder, RunFolder
+from handover.scenarios.runs.results.tolerated_faults import ToleratedFaults
 from handover.scenarios.study.folder.session_folder import RoundRecord
 from handover.scenarios.study.folder.session_notes import timestamp
 from handover.scenarios.study.plan.led_hands import led_hand_of

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from handover.scenarios.campaign.statistics import holm, sign_flip_test, success_interval
+from handover.scenarios.runs.campaign.statistics import holm, sign_flip_test, success_interval
 from handover.scenarios.study.folder.session_folder import SessionFolder
 from handover.scenarios.study.folder.study_folder import StudyFolder
 from handover.scenarios.study.statistics.exact_tests import (

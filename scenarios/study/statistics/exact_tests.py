@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from scipy.stats import rankdata
 
 from handover.cosim.blocks.ports import Floats
-from handover.scenarios.campaign.statistics import LEVEL, chosen_sums, sign_flip_test
+from handover.scenarios.runs.campaign.statistics import LEVEL, chosen_sums, sign_flip_test
 
 MIN_PARTICIPANTS = 6
 """Fewer cannot reject at 5 % by any test of signs: five that differ alike have p = 2 / 2^5 = 0.0625."""

@@ -22,7 +22,7 @@ from scipy.special import expit
 from scipy.stats import norm, t
 
 from handover.cosim.blocks.ports import Floats
-from handover.scenarios.campaign.statistics import LEVEL
+from handover.scenarios.runs.campaign.statistics import LEVEL
 
 _NODES: Floats = np.linspace(-8.0, 8.0, 161)
 """Of the trapezoidal rule over a standard normal variable, whose error falls exponentially with the spacing: below 1e-8

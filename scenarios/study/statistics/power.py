@@ -12,7 +12,7 @@ import numpy as np
 from scipy import stats
 
 from handover.cosim.blocks.ports import Floats
-from handover.scenarios.campaign.statistics import LEVEL, holm, success_interval
+from handover.scenarios.runs.campaign.statistics import LEVEL, holm, success_interval
 from handover.scenarios.study.plan.plan import StudyPlan
 from handover.scenarios.study.statistics.exact_tests import MIN_PARTICIPANTS, signed_rank_p
 

@@ -90,7 +90,9 @@ def test_paragraphs_formulas_lists_and_errors_of_a_docstring_keep_their_order():
 
 
 def test_papers_are_called_as_where_their_numbers_are():
-    content = [" ".join(file.read_text().replace("\n# ", " ").split()) for file in HOUSE.glob("scenarios/*/paper.toml")]
+    content = [
+        " ".join(file.read_text().replace("\n# ", " ").split()) for file in HOUSE.glob("scenarios/robots/*/paper.toml")
+    ]
     for key, paper in PAPERS.items():
         assert any(f"# {paper} [{key}]." in text for text in content), key
 

@@ -13,8 +13,8 @@ from support.wording import Wording
 import handover
 from handover.cosim.fmu.file.description import describe_fmu
 from handover.scenarios.api.environment import ScenarioEnvironment, space_of
-from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
-from handover.scenarios.ir_grasp.parameters import Parameters
+from handover.scenarios.robots.ir_grasp.ir_grasp import IrGrasp
+from handover.scenarios.robots.ir_grasp.parameters import Parameters
 
 COMMANDS = ("p_WH_cmd", "yaw_cmd", "sigma_cmd")
 

@@ -45,7 +45,7 @@ def test_type_checkers_see_what_is_loaded():
 def test_importing_results_leaves_the_users_matplotlib_alone():
     program = (
         "import matplotlib; matplotlib.use('svg'); import handover; handover.Run; "
-        "import handover.scenarios.reporting.run_figures; import sys; "
+        "import handover.scenarios.runs.reporting.run_figures; import sys; "
         "print(matplotlib.get_backend(), 'matplotlib.pyplot' in sys.modules)"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)

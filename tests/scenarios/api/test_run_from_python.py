@@ -22,7 +22,7 @@ from handover.scenarios.api.arguments import master_options
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.parameters import InvalidParameter
-from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
+from handover.scenarios.robots.ir_grasp.ir_grasp import IrGrasp
 
 OPTIONS = set(handover.run.__kwdefaults__ or {}) | set(handover.sweep.__kwdefaults__ or {})
 

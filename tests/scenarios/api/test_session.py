@@ -15,7 +15,7 @@ from support.wording import Wording
 
 import handover
 from handover.cosim.ssp.writing import write_ssp
-from handover.scenarios.execution.file_experiment import UntilStop
+from handover.scenarios.runs.execution.file_experiment import UntilStop
 
 
 def gain(fmu: Path) -> handover.System:

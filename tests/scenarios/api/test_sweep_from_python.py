@@ -11,9 +11,9 @@ from support.cosim.native_units import native_fmu
 from support.in_process_pool import InProcessPool
 
 import handover
-from handover.scenarios.campaign import pool_config
-from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
+from handover.scenarios.robots.ir_grasp.ir_grasp import IrGrasp
+from handover.scenarios.runs.campaign import pool_config
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 GIVEN: dict[str, Any] = {"seeds": 2, "strategy": ["blind", "reflex"], "standoff": 0.06}
 PROGRAM = """

@@ -11,12 +11,12 @@ import pytest
 from support.campaigns import short_plan
 from support.in_process_pool import InProcessPool
 
-from handover.scenarios.campaign.campaign import run_campaign
-from handover.scenarios.campaign.folder import CampaignFolder
-from handover.scenarios.campaign.plan_check import prepared
-from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.campaign.worker_pool import JobResult, RunCounts, RunJob
 from handover.scenarios.cli.campaign import CampaignInterruption, run_campaign_command
+from handover.scenarios.runs.campaign.campaign import run_campaign
+from handover.scenarios.runs.campaign.folder import CampaignFolder
+from handover.scenarios.runs.campaign.plan_check import prepared
+from handover.scenarios.runs.campaign.table import CampaignTable
+from handover.scenarios.runs.campaign.worker_pool import JobResult, RunCounts, RunJob
 
 PLAN = short_plan()
 NAMES = [run.name for run in PLAN.runs()]

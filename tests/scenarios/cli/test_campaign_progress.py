@@ -6,8 +6,8 @@ import threading
 
 import pytest
 
-from handover.scenarios.campaign.worker_pool import RunCounts
 from handover.scenarios.cli.campaign import CampaignProgress, format_time_left
+from handover.scenarios.runs.campaign.worker_pool import RunCounts
 
 
 @pytest.mark.parametrize(

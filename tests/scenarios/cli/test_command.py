@@ -16,7 +16,7 @@ from handover.fmus.catalog import UNITS
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.cli.command import DeferringGroup, main
 from handover.scenarios.cli.console import open_console, print_rows
-from handover.scenarios.execution.progress import say
+from handover.scenarios.runs.execution.progress import say
 
 
 def test_lists_have_robots_scenarios_units_and_their_parameters_and_ports():

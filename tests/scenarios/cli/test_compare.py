@@ -11,8 +11,8 @@ from support.campaigns import campaign_metadata, carried_out, folder_of, table_o
 from support.commands import call
 from support.opened_page import opened, overflow
 
-from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.experiment.plotting import PRINTED_FORMATS
+from handover.scenarios.runs.campaign.plan import CampaignPlan
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ import pytest
 from support.commands import refusal
 from support.installed import distributions, link_distributions
 
-from handover.scenarios.execution.errors import UsageError
+from handover.scenarios.runs.execution.errors import UsageError
 
 ROOT = Path(__file__).parents[3]
 

@@ -18,10 +18,10 @@ from handover.fmus.build import cached
 from handover.fmus.catalog import UNITS, PackageFailure
 from handover.fmus.contents.icons import catalog_icon
 from handover.scenarios.cli.list import place_data, print_place
-from handover.scenarios.execution.errors import UsageError
-from handover.scenarios.execution.unit_values import built_system
 from handover.scenarios.experiment.places import Place
-from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
+from handover.scenarios.robots.ir_grasp.ir_grasp import IrGrasp
+from handover.scenarios.runs.execution.errors import UsageError
+from handover.scenarios.runs.execution.unit_values import built_system
 
 FEW = ("Push", "IrReflex")
 

@@ -12,10 +12,10 @@ from click.testing import CliRunner
 from handover.scenarios.catalog import SCENARIOS, SYSTEMS
 from handover.scenarios.cli.command import COMMANDS, DeferredCommand, DeferringGroup, main
 
-PAGES = {"scipy.stats", "plotly", "networkx", "tsdownsample", "distributed", "handover.scenarios.reporting.page"}
+PAGES = {"scipy.stats", "plotly", "networkx", "tsdownsample", "distributed", "handover.scenarios.runs.reporting.page"}
 HEAVY = {"matplotlib", "scipy", "cv2", "plotly", "distributed", "dask", "pyarrow", "fmpy", "control", "exudyn"}
 HELP = HEAVY | {"numpy", "rich", "pymunk", "handover.cosim.blocks", "handover.cosim.fmu", "handover.fmus"}
-OTHER_ROBOTS = {"handover.scenarios.vsl", "handover.scenarios.free_flyer"}
+OTHER_ROBOTS = {"handover.scenarios.robots.vsl", "handover.scenarios.robots.free_flyer"}
 CALLS = (
     (["--version"], HELP),
     (["--help"], HELP),

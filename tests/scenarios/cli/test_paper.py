@@ -9,11 +9,11 @@ from click.testing import Result
 from support.commands import call, data_in
 from support.in_process_pool import InProcessPool
 
-from handover.scenarios.campaign import pool_config
-from handover.scenarios.campaign.folder import CampaignFolder
-from handover.scenarios.campaign_report.campaign_page import write_campaign_page
+from handover.scenarios.pages.campaign_report.campaign_page import write_campaign_page
 from handover.scenarios.published.catalog import EXPERIMENTS
 from handover.scenarios.published.ir_grasp.ir_table import IrTable
+from handover.scenarios.runs.campaign import pool_config
+from handover.scenarios.runs.campaign.folder import CampaignFolder
 
 _PUBLISHED_VERDICTS = {"reproduced", "not reproduced", "not comparable"}
 _OWN_VERDICTS = {"holds", "does not hold", "too few runs"}

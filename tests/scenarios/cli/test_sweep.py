@@ -12,11 +12,11 @@ from support.cosim.native_units import native_fmu
 from support.in_process_pool import InProcessPool
 
 from handover.cosim.files import folder_locked
-from handover.scenarios.campaign import plan_check, pool_config
-from handover.scenarios.campaign.local_pool import LocalPool
-from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.campaign.worker_pool import RunJob
-from handover.scenarios.execution.errors import ClusterLost, PoolError
+from handover.scenarios.runs.campaign import plan_check, pool_config
+from handover.scenarios.runs.campaign.local_pool import LocalPool
+from handover.scenarios.runs.campaign.table import CampaignTable
+from handover.scenarios.runs.campaign.worker_pool import RunJob
+from handover.scenarios.runs.execution.errors import ClusterLost, PoolError
 
 CALL = ("sweep", native_fmu("mass"), "m=1,2", "-p", "f=1", "--workers", "2")
 INTO_C = ("--out", "c", "--no-report")

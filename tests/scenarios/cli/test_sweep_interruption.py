@@ -10,8 +10,8 @@ import pytest
 from support.cosim.native_units import native_fmu
 from support.sweep_process import ended, runs_in, sweeping, wait_for
 
-from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.cli.campaign import CampaignInterruption
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 pytestmark = pytest.mark.slow
 

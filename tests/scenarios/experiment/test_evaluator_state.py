@@ -12,7 +12,7 @@ from handover.cosim.blocks.state import NotPlainData
 from handover.cosim.blocks.units import Metre
 from handover.cosim.system.signals import Signals
 from handover.scenarios.experiment.experiment import Evaluator, Outcome
-from handover.scenarios.results.tolerated_faults import EvaluatorNotSaved, GuardedEvaluator
+from handover.scenarios.runs.results.tolerated_faults import EvaluatorNotSaved, GuardedEvaluator
 
 
 class Side(enum.IntEnum):

@@ -18,11 +18,11 @@ from handover.scenarios.experiment.parameters import (
     idle_parameters,
     parse_parameters,
 )
-from handover.scenarios.free_flyer.handover.handovers import RobotToHuman
-from handover.scenarios.helix.disturbances import Cover
-from handover.scenarios.helix.helix_handover import HelixHandover
-from handover.scenarios.helix.parameters import HandPlace
-from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
+from handover.scenarios.robots.free_flyer.handover.handovers import RobotToHuman
+from handover.scenarios.robots.helix.disturbances import Cover
+from handover.scenarios.robots.helix.helix_handover import HelixHandover
+from handover.scenarios.robots.helix.parameters import HandPlace
+from handover.scenarios.robots.ir_grasp.ir_grasp import IrGrasp
 
 
 def test_values_are_parsed_by_their_declared_kind_and_what_is_not_given_has_its_default():

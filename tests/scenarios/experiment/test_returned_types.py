@@ -18,7 +18,7 @@ from handover.scenarios.experiment.live_inputs import Pushable
 from handover.scenarios.experiment.replay import Line, Replay
 from handover.scenarios.experiment.returned_types import Expected, WrongArguments, WrongType
 from handover.scenarios.experiment.time_plot import Curve, Level, TimeFigure, TimePlot
-from handover.scenarios.results.tolerated_faults import ToleratedFaults
+from handover.scenarios.runs.results.tolerated_faults import ToleratedFaults
 
 CURVE = Curve(label="x", values=np.zeros(3))
 PLOT = TimePlot(title="x", quantity="x", unit="", curves=[CURVE])

@@ -3,9 +3,9 @@
 import asyncio
 import time
 
-from handover.scenarios.free_flyer.robot_wiring import PUSHES_WITH_JOINTS
 from handover.scenarios.live.body_pushes import BodyPushes
 from handover.scenarios.live.commands import Push
+from handover.scenarios.robots.free_flyer.robot_wiring import PUSHES_WITH_JOINTS
 
 NONE, POINT = (0.0, 0.0, 0.0), (0.1, 0.0, 0.0)
 ROBOT, GRIPPER = PUSHES_WITH_JOINTS

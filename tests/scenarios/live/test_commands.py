@@ -11,7 +11,6 @@ from support.wording import Wording
 
 from handover.cosim.master.live_control import LiveControl
 from handover.scenarios.experiment.live_inputs import Pushable
-from handover.scenarios.free_flyer.robot_wiring import PUSHES
 from handover.scenarios.live.commands import (
     LONGEST,
     Command,
@@ -24,6 +23,7 @@ from handover.scenarios.live.commands import (
     run_number,
     signal_names,
 )
+from handover.scenarios.robots.free_flyer.robot_wiring import PUSHES
 
 STRONG = [replace(push, greatest=40.0) for push in PUSHES]
 PUSH = {"body": "robot", "force": [1.0, 0.0, 0.0], "point": [0.1, 0.0, 0.0]}

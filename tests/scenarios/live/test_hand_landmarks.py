@@ -13,7 +13,7 @@ from support.hand_points import landmarks_of_hand, turned
 from handover.cosim.blocks.geometry import rotation_of
 from handover.cosim.blocks.ports import Floats
 from handover.plants.free_flyer.hand.hand_kinematics import CLOSED, STRAIGHT
-from handover.scenarios.reporting.page import asset
+from handover.scenarios.runs.reporting.page import asset
 
 pytestmark = pytest.mark.slow
 

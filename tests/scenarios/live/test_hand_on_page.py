@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from playwright.sync_api import Browser, CDPSession, Page
 
 from handover.cosim.blocks.geometry import rotation_of
-from handover.scenarios.reporting.page import asset
+from handover.scenarios.runs.reporting.page import asset
 
 SPEED, TURN, PINCH = 0.4, 1.2, 0.002
 """m/s and rad/s of a stick or key that is held, and m a pixel of two fingers."""

@@ -12,8 +12,8 @@ from support.wording import Wording
 
 import handover
 from handover.cosim.record.reader import Record
-from handover.scenarios.execution.selection import find_scenario
 from handover.scenarios.experiment.parameters import parse_parameters
+from handover.scenarios.runs.execution.selection import find_scenario
 
 SCENARIO = "flyer_robot_to_human"
 PIXEL = """p => {
@@ -111,7 +111,7 @@ def test_who_leads_a_hand_is_told_what_to_do_and_one_that_the_person_leads_nobod
         ("flyer_failed_reception", outside),
         ("flyer_collaborative", outside),
         ("flyer_handover", (*outside, to_robot)),
-        ("handover.scenarios.free_flyer.handover.hand_practice:HandPractice", ()),
+        ("handover.scenarios.robots.free_flyer.handover.hand_practice:HandPractice", ()),
     ):
         kind = find_scenario(scenario)
         led = kind().led_hand(parse_parameters(kind, given))

@@ -32,12 +32,12 @@ from support.wording import Wording
 from handover.cosim.master.live_control import LiveControl
 from handover.cosim.record.reader import Record
 from handover.fmus.build import cached
-from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
-from handover.scenarios.ir_grasp.parameters import Parameters
 from handover.scenarios.live.live_page import LivePage
 from handover.scenarios.live.shown_run import ShownRun
 from handover.scenarios.live.watched_run import WatchedRun
-from handover.scenarios.results.pictures import read_picture_files
+from handover.scenarios.robots.ir_grasp.ir_grasp import IrGrasp
+from handover.scenarios.robots.ir_grasp.parameters import Parameters
+from handover.scenarios.runs.results.pictures import read_picture_files
 
 TITLES = "[...document.querySelectorAll('#plots h3')].map(heading => heading.textContent)"
 REACHED = "document.getElementById('reached').value"

@@ -9,10 +9,10 @@ from support.cosim.native_units import native_fmu
 
 from handover.cosim.blocks.variable import Causality, Declared, Kind
 from handover.cosim.python_process import code_command
-from handover.scenarios.execution.request import RunRequest
 from handover.scenarios.live.parameter_fields import faults_by_name, field_groups, field_of, without_call
 from handover.scenarios.live.play_page import Session
 from handover.scenarios.live.waiting_command import WaitingCommand
+from handover.scenarios.runs.execution.request import RunRequest
 
 
 @pytest.mark.parametrize(

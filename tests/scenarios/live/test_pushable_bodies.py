@@ -16,9 +16,9 @@ from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.cosim.system.time_series import TimeSeries
 from handover.scenarios.catalog import SCENARIOS
-from handover.scenarios.execution.interruption import Interruption
-from handover.scenarios.execution.runner import run_task
-from handover.scenarios.results.task import InputSources
+from handover.scenarios.runs.execution.interruption import Interruption
+from handover.scenarios.runs.execution.runner import run_task
+from handover.scenarios.runs.results.task import InputSources
 
 _STOP = 0.4
 

@@ -8,7 +8,7 @@ import pytest
 from support.scenarios.tutorial import QUIET, SCENE, call, ran, refused, signals, succeeded
 
 from handover.cosim.record.reader import Record
-from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 pytestmark = pytest.mark.slow
 

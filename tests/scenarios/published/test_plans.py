@@ -2,8 +2,8 @@
 
 import pytest
 
-from handover.scenarios.campaign.plan_check import checked_plan
 from handover.scenarios.published.catalog import EXPERIMENTS
+from handover.scenarios.runs.campaign.plan_check import checked_plan
 
 SIZES = {
     "flyer-approaches": (1_280, 20),

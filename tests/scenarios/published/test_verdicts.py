@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from support.wording import Wording
 
-from handover.scenarios.campaign.statistics import success_interval
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable, Verdict, verdict_counts
 from handover.scenarios.published.verdicts import (
     FEW,
@@ -22,6 +21,7 @@ from handover.scenarios.published.verdicts import (
     ratio_interval,
     without_verdict,
 )
+from handover.scenarios.runs.campaign.statistics import success_interval
 
 REPRODUCED, NOT_REPRODUCED, NOT_COMPARABLE = Verdict
 CLAIM = Claim(

@@ -18,7 +18,7 @@ from support.processes import with_path
 from support.scenarios.sample_study import PLAN, read_by_codebook, record, same, session, write_study
 from support.wording import Wording
 
-from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
+from handover.scenarios.runs.results.run_folder import InvalidRunFolder, RunFolder
 from handover.scenarios.study.folder.codebook import questionnaire_columns, write_csv
 from handover.scenarios.study.folder.session_folder import SessionFolder
 from handover.scenarios.study.folder.study_folder import StudyFolder

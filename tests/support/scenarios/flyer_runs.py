@@ -9,13 +9,13 @@ from typing import Any
 
 from handover.cosim.record.reader import Record
 from handover.fmus.build import cached
-from handover.scenarios.execution.interruption import Interruption
-from handover.scenarios.execution.runner import run_task
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.parameters import parse_parameters
-from handover.scenarios.results.run_folder import RunFolder
-from handover.scenarios.results.summary import RunResult, metric_of
-from handover.scenarios.results.task import Task
+from handover.scenarios.runs.execution.interruption import Interruption
+from handover.scenarios.runs.execution.runner import run_task
+from handover.scenarios.runs.results.run_folder import RunFolder
+from handover.scenarios.runs.results.summary import RunResult, metric_of
+from handover.scenarios.runs.results.task import Task
 from support.kept_runs import kept_run
 
 

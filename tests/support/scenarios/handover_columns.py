@@ -2,9 +2,9 @@
 
 from typing import Any
 
-from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.experiment.parameters import parse_parameters
-from handover.scenarios.helix.helix_handover import HelixHandover
+from handover.scenarios.robots.helix.helix_handover import HelixHandover
+from handover.scenarios.runs.campaign.plan import CampaignPlan
 
 
 def columns(plan: CampaignPlan) -> list[dict[str, Any]]:

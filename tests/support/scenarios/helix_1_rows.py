@@ -5,7 +5,7 @@ from typing import Any
 
 import pyarrow as pa
 
-from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 PLACES = ("front", "front_left", "left", "back_left")
 PERIODS = {0.1: 1.38, 0.2: 1.51, 0.4: 1.45}

@@ -5,8 +5,8 @@ from typing import Any
 
 import pyarrow as pa
 
-from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 
 def made_table(rows: Iterable[Mapping[str, Any]]) -> CampaignTable:

@@ -5,8 +5,8 @@ import sys
 from pathlib import Path
 
 if __name__ == "__main__":
-    from handover.scenarios.campaign.cluster import connect_cluster
-    from handover.scenarios.campaign.local_pool import LocalPool
+    from handover.scenarios.runs.campaign.cluster import connect_cluster
+    from handover.scenarios.runs.campaign.local_pool import LocalPool
 
     jobs = pickle.loads(Path(sys.argv[1]).read_bytes())
     try:

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from handover.cosim.stepping.options import MasterOptions
 from handover.fmus.build import build_block, cached
-from handover.scenarios.campaign.worker_pool import RunJob
 from handover.scenarios.catalog import SCENARIOS
+from handover.scenarios.runs.campaign.worker_pool import RunJob
 from support.cosim.native_units import native_fmu
 
 

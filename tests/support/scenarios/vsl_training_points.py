@@ -14,8 +14,8 @@ from handover.controllers.vsl.model_text import read_model
 from handover.cosim.blocks.ports import Floats
 from handover.fmus.build import cached
 from handover.scenarios.cli.robots.vsl_train import vsl_train
-from handover.scenarios.vsl.training import VslTraining
-from handover.scenarios.vsl.training_data import Dataset, Measured
+from handover.scenarios.robots.vsl.training import VslTraining
+from handover.scenarios.robots.vsl.training_data import Dataset, Measured
 
 
 class Trained(NamedTuple):

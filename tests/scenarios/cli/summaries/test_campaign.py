@@ -7,14 +7,14 @@ from typing import Any
 
 import pytest
 
-from handover.scenarios.campaign.folder import CampaignFolder
-from handover.scenarios.campaign.plan import CampaignPlan, PlannedRun
-from handover.scenarios.campaign.results import CampaignResults
-from handover.scenarios.campaign.table import CampaignTable, RunRow
-from handover.scenarios.campaign.table_writer import table_of
-from handover.scenarios.campaign.worker_pool import RunCounts
 from handover.scenarios.cli.summaries.campaign import campaign_data, print_campaign, print_report_place
 from handover.scenarios.experiment.experiment import Metric
+from handover.scenarios.runs.campaign.folder import CampaignFolder
+from handover.scenarios.runs.campaign.plan import CampaignPlan, PlannedRun
+from handover.scenarios.runs.campaign.results import CampaignResults
+from handover.scenarios.runs.campaign.table import CampaignTable, RunRow
+from handover.scenarios.runs.campaign.table_writer import table_of
+from handover.scenarios.runs.campaign.worker_pool import RunCounts
 
 
 def printed(plan: CampaignPlan, rows: list[RunRow], capsys: pytest.CaptureFixture[str]) -> tuple[str, list[Any]]:

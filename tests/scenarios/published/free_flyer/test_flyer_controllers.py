@@ -10,12 +10,12 @@ from support.sketched_figures import Sketches
 from support.sketched_figures import sketches as sketches
 from support.wording import Wording
 
-from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.published.free_flyer.flyer_controllers import (
     DISTURBANCES,
     FlyerControllers,
 )
 from handover.scenarios.published.published_experiment import Claim, Verdict
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 NUMBERS = {name for what in DISTURBANCES for name in what.parameters}
 LIMITS = ("impedance.f_max", "impedance.tau_max")

@@ -12,12 +12,6 @@ from support.sketched_figures import Sketches
 from support.sketched_figures import sketches as sketches
 from support.wording import Wording
 
-from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.execution.interruption import Interruption
-from handover.scenarios.execution.runner import run_task
-from handover.scenarios.execution.unit_values import split_parameters
-from handover.scenarios.free_flyer.handover.handovers import HandoverOfTask
-from handover.scenarios.free_flyer.parameters import Behaviour, Propulsion, Task
 from handover.scenarios.published.free_flyer.flyer_approaches import CASES, FlyerApproaches, places
 from handover.scenarios.published.free_flyer.flyer_handover import (
     ARMS,
@@ -32,6 +26,12 @@ from handover.scenarios.published.free_flyer.flyer_handover import (
 from handover.scenarios.published.free_flyer.flyer_handover_figures import figure_number
 from handover.scenarios.published.free_flyer.handovers import EXCHANGES, GIVING
 from handover.scenarios.published.published_experiment import Claim, Verdict
+from handover.scenarios.robots.free_flyer.handover.handovers import HandoverOfTask
+from handover.scenarios.robots.free_flyer.parameters import Behaviour, Propulsion, Task
+from handover.scenarios.runs.campaign.table import CampaignTable
+from handover.scenarios.runs.execution.interruption import Interruption
+from handover.scenarios.runs.execution.runner import run_task
+from handover.scenarios.runs.execution.unit_values import split_parameters
 
 NUMBERS = ("strength", "arm_factor", "model_arm_factor", "mass_factor", "inertia_factor", "decision.gate_error")
 SIGHT = {"sight_error": 0.002, "depth_error": 0.006}

@@ -10,13 +10,13 @@ from support.scenarios.made_tables import made_table, one
 from support.sketched_figures import Sketches
 from support.sketched_figures import sketches as sketches
 
-from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.free_flyer.parameters import Axis, Behaviour, ImpedanceParameters, Wrench
 from handover.scenarios.published.free_flyer import flyer_impedance
 from handover.scenarios.published.free_flyer.flyer_impedance import FlyerImpedanceTable
 from handover.scenarios.published.free_flyer.handovers import EXACT
 from handover.scenarios.published.free_flyer.linear_model import PUSHES, Push, predicted_errors, predicted_greatest
 from handover.scenarios.published.published_experiment import Claim, Verdict
+from handover.scenarios.robots.free_flyer.parameters import Axis, Behaviour, ImpedanceParameters, Wrench
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 NUMBERS = ("duration", "mass_factor", "inertia_factor", "arm_factor", *EXACT)
 

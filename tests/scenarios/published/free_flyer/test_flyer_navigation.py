@@ -12,8 +12,6 @@ from support.sketched_figures import Sketches
 from support.sketched_figures import sketches as sketches
 
 from handover.plants.free_flyer.robot.navigation import Params
-from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.free_flyer.handover.person_evaluation import Cause
 from handover.scenarios.published.free_flyer.flyer_navigation import (
     DELAY,
     ESTIMATE_ERRORS,
@@ -24,6 +22,8 @@ from handover.scenarios.published.free_flyer.flyer_navigation import (
     rest_probability,
 )
 from handover.scenarios.published.published_experiment import Claim, Verdict
+from handover.scenarios.robots.free_flyer.handover.person_evaluation import Cause
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 Run = Mapping[str, str]
 

@@ -9,11 +9,11 @@ from support.scenarios.made_tables import made_table
 from support.sketched_figures import Sketches
 from support.sketched_figures import sketches as sketches
 
-from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.free_flyer.parameters import Behaviour
 from handover.scenarios.published.free_flyer.flyer_stability import FlyerStability
 from handover.scenarios.published.free_flyer.linear_model import linear_loop
 from handover.scenarios.published.published_experiment import Verdict
+from handover.scenarios.robots.free_flyer.parameters import Behaviour
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 
 @cache

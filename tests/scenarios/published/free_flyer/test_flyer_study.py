@@ -10,9 +10,6 @@ from support.scenarios.made_tables import made_table
 from support.sketched_figures import Sketches
 from support.sketched_figures import sketches as sketches
 
-from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.free_flyer.handover.person_evaluation import Cause
-from handover.scenarios.free_flyer.parameters import Behaviour, Task
 from handover.scenarios.published.free_flyer.flyer_study import (
     TRAITS,
     FlyerStudy,
@@ -21,6 +18,9 @@ from handover.scenarios.published.free_flyer.flyer_study import (
     participants,
 )
 from handover.scenarios.published.published_experiment import Claim, Verdict
+from handover.scenarios.robots.free_flyer.handover.person_evaluation import Cause
+from handover.scenarios.robots.free_flyer.parameters import Behaviour, Task
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 NAMES = [trait.name for trait in TRAITS]
 H2 = "The rigid robot succeeds more often (H2): collaborative"

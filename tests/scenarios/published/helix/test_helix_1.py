@@ -20,15 +20,15 @@ from support.sketched_figures import Sketches
 from support.sketched_figures import sketches as sketches
 from support.wording import Wording
 
-from handover.scenarios.campaign.campaign import run_campaign
-from handover.scenarios.campaign.folder import CampaignFolder
-from handover.scenarios.campaign.local_pool import LocalPool
-from handover.scenarios.campaign.plan_check import checked_plan, prepared
-from handover.scenarios.campaign.statistics import MIN_SAMPLES
-from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.cli.campaign import CampaignProgress
 from handover.scenarios.published.helix.helix_1 import Helix1
 from handover.scenarios.published.published_experiment import Claim, PaperResults, Verdict, draw_figures, write_claims
+from handover.scenarios.runs.campaign.campaign import run_campaign
+from handover.scenarios.runs.campaign.folder import CampaignFolder
+from handover.scenarios.runs.campaign.local_pool import LocalPool
+from handover.scenarios.runs.campaign.plan_check import checked_plan, prepared
+from handover.scenarios.runs.campaign.statistics import MIN_SAMPLES
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 PERIOD_TEXTS = {"0.1": "1.38", "0.2": "1.51", "0.4": "1.45"}
 

@@ -6,9 +6,9 @@ from typing import Any
 import pytest
 from support.scenarios.made_tables import made_table
 
-from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.published.helix.helix_2 import Helix2
 from handover.scenarios.published.published_experiment import Verdict
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 
 def table_of(guided: float = 15.0, quick: bool = False, never: bool = False) -> CampaignTable:

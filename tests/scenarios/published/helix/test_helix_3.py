@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 from support.scenarios.made_tables import made_table
 
-from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.published.helix.helix_3 import Helix3
 from handover.scenarios.published.published_experiment import Verdict
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 
 def table_of(failed: int = 0) -> CampaignTable:

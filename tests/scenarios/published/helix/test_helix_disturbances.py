@@ -4,10 +4,10 @@ import pytest
 from support.scenarios.handover_columns import columns
 from support.scenarios.made_tables import empty, made_table
 
-from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.published.helix.helix_cases import runs_by_case
 from handover.scenarios.published.helix.helix_disturbances import CASES, HelixDisturbances
 from handover.scenarios.published.published_experiment import Verdict
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 PLAN = HelixDisturbances().plan(quick=False)
 COLUMNS = columns(PLAN)

@@ -4,9 +4,9 @@ import pytest
 from support.scenarios.handover_columns import columns
 from support.scenarios.made_tables import empty, made_table
 
-from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.published.helix.helix_improvements import CHANGES, HelixImprovements
 from handover.scenarios.published.published_experiment import Verdict
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 PLAN = HelixImprovements().plan(quick=False)
 COLUMNS = columns(PLAN)

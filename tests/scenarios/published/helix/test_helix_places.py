@@ -6,10 +6,10 @@ from support.scenarios.made_tables import made_table
 from support.sketched_figures import Sketches
 from support.sketched_figures import sketches as sketches
 
-from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.helix.workspace import cameras_that_see, reach
 from handover.scenarios.published.helix.helix_places import HelixPlaces, random_places
 from handover.scenarios.published.published_experiment import Verdict
+from handover.scenarios.robots.helix.workspace import cameras_that_see, reach
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 PLACES = random_places(200)
 

@@ -12,10 +12,10 @@ from support.sketched_figures import Sketches
 from support.sketched_figures import sketches as sketches
 from support.wording import Wording
 
-from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.helix.reflex_grasp_parameters import ReflexGraspParameters
 from handover.scenarios.published.helix.helix_reflex import CAMERAS, MISMATCHES, HelixReflex, offsets, pairs
 from handover.scenarios.published.published_experiment import Verdict
+from handover.scenarios.robots.helix.reflex_grasp_parameters import ReflexGraspParameters
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 NOTHING: Mapping[str, str] = {}
 HOLDS, NOT, FEW = Verdict.REPRODUCED, Verdict.NOT_REPRODUCED, Verdict.NOT_COMPARABLE

@@ -12,11 +12,6 @@ from support.sketched_figures import Sketches
 from support.sketched_figures import sketches as sketches
 
 from handover.plants.ir_grasp.objects import Thing
-from handover.scenarios.campaign.campaign import run_campaign
-from handover.scenarios.campaign.folder import CampaignFolder
-from handover.scenarios.campaign.plan_check import prepared
-from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.ir_grasp.ir_sensor import Finger
 from handover.scenarios.published.ir_grasp.ir_convergence import IrConvergence, descents_of
 from handover.scenarios.published.ir_grasp.ir_limits import IrLimits
 from handover.scenarios.published.ir_grasp.ir_sensor import (
@@ -35,6 +30,11 @@ from handover.scenarios.published.published_experiment import (
     draw_figures,
     write_claims,
 )
+from handover.scenarios.robots.ir_grasp.ir_sensor import Finger
+from handover.scenarios.runs.campaign.campaign import run_campaign
+from handover.scenarios.runs.campaign.folder import CampaignFolder
+from handover.scenarios.runs.campaign.plan_check import prepared
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 pytestmark = pytest.mark.slow
 

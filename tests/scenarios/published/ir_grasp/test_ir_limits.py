@@ -12,8 +12,6 @@ from handover.controllers.ir_grasp.ir_reflex import IrReflex
 from handover.cosim.blocks.description import describe
 from handover.plants.ir_grasp.objects import is_held_out
 from handover.plants.ir_grasp.scene import GraspScene
-from handover.scenarios.campaign.plan import PlannedRun
-from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.published.ir_grasp.ir_limits import IrLimits
 from handover.scenarios.published.ir_grasp.limits_axes import (
     ARMS,
@@ -29,6 +27,8 @@ from handover.scenarios.published.ir_grasp.limits_axes import (
 )
 from handover.scenarios.published.ir_grasp.limits_results import Comparison, LimitRuns, sentence_of_worth
 from handover.scenarios.published.published_experiment import Claim, Verdict
+from handover.scenarios.runs.campaign.plan import PlannedRun
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 WITHOUT = tuple(arm for arm in ARMS if not arm.looks)
 UNITS = {"scene": GraspScene, "reflex": IrReflex}

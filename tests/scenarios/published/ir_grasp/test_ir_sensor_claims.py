@@ -5,9 +5,6 @@ from collections.abc import Callable
 import pytest
 from support.scenarios.made_tables import empty, made_table, one
 
-from handover.scenarios.campaign.plan import PlannedRun
-from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.ir_grasp.ir_sensor import AT, Finger
 from handover.scenarios.published.ir_grasp.ir_sensor import (
     REFLECTIVITIES,
     TOLERANCES,
@@ -16,6 +13,9 @@ from handover.scenarios.published.ir_grasp.ir_sensor import (
     sensor_runs,
 )
 from handover.scenarios.published.published_experiment import Verdict
+from handover.scenarios.robots.ir_grasp.ir_sensor import AT, Finger
+from handover.scenarios.runs.campaign.plan import PlannedRun
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 
 def sensor_table(**metrics: Callable[[PlannedRun], float | None]) -> CampaignTable:

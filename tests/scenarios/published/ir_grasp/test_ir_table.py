@@ -14,10 +14,10 @@ from support.sketched_figures import sketches as sketches
 from support.wording import Wording
 
 from handover.plants.ir_grasp.objects import Thing
-from handover.scenarios.campaign.plan import PlannedRun
-from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.published.ir_grasp.ir_table import BLIND, FORWARD_35, REFLEX, IrTable, IrTableRuns
 from handover.scenarios.published.published_experiment import Claim, Verdict
+from handover.scenarios.runs.campaign.plan import PlannedRun
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 TUNED = range(1000, 1008)
 """Seeds with which the scenario was tuned."""

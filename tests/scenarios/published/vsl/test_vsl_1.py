@@ -11,10 +11,10 @@ import pytest
 from support.scenarios.made_tables import made_table, text_of
 from support.wording import Wording
 
-from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.published.published_experiment import Claim, Verdict
 from handover.scenarios.published.vsl.separation import MIN_RUNS, Comparison, p_value_of_separation, separation_claim
 from handover.scenarios.published.vsl.vsl_1 import Vsl1, Vsl1Runs, cell
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 
 def usual(given: Mapping[str, str]) -> float:

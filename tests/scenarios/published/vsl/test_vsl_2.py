@@ -9,7 +9,6 @@ from support.scenarios.made_tables import made_table
 from support.sketched_figures import Sketches
 from support.sketched_figures import sketches as sketches
 
-from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.published.published_experiment import Claim, Verdict
 from handover.scenarios.published.vsl.vsl_2 import (
     CASES,
@@ -23,7 +22,8 @@ from handover.scenarios.published.vsl.vsl_2 import (
     Vsl2,
     Vsl2Runs,
 )
-from handover.scenarios.vsl.parameters import HybridParameters
+from handover.scenarios.robots.vsl.parameters import HybridParameters
+from handover.scenarios.runs.campaign.table import CampaignTable
 
 Given = Mapping[str, str]
 NUMBERS = ("joint_factor", "EI_factor", "mass_factor", "friction_factor", "arm_scatter")

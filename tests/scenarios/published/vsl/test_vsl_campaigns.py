@@ -10,12 +10,12 @@ from support.sketched_figures import Sketches
 from support.sketched_figures import sketches as sketches
 
 from handover.cosim.record.reader import Record
-from handover.scenarios.campaign.campaign import run_campaign
-from handover.scenarios.campaign.folder import CampaignFolder
-from handover.scenarios.campaign.plan_check import prepared
 from handover.scenarios.published.published_experiment import draw_figures
 from handover.scenarios.published.vsl.path_traces import PathTrace, Repetitions, trace_of
 from handover.scenarios.published.vsl.vsl_1 import Vsl1, Vsl1Runs, cell
+from handover.scenarios.runs.campaign.campaign import run_campaign
+from handover.scenarios.runs.campaign.folder import CampaignFolder
+from handover.scenarios.runs.campaign.plan_check import prepared
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ from support.scenarios.sample_study import PLAN, play, record, same, session
 from support.wording import Wording
 
 from handover.scenarios.experiment.live_inputs import LedHand
-from handover.scenarios.reporting.page import asset
+from handover.scenarios.runs.reporting.page import asset
 from handover.scenarios.study.folder.study_folder import StudyFolder
 from handover.scenarios.study.session.device_test import DeviceTest
 from handover.scenarios.study.session.protocol import MOST_ATTEMPTS, SCREENS, InvalidAction, Protocol

@@ -16,10 +16,10 @@ from support.scenarios.sample_study import record, same, session, write_study
 from handover.cosim.record.reader import Record
 from handover.cosim.system.time_series import TimeSeries
 from handover.scenarios.cli.command import main
-from handover.scenarios.execution.interruption import Interruption
-from handover.scenarios.execution.request import RunRequest
-from handover.scenarios.execution.runner import run_task
-from handover.scenarios.results.task import InputSources, Task
+from handover.scenarios.runs.execution.interruption import Interruption
+from handover.scenarios.runs.execution.request import RunRequest
+from handover.scenarios.runs.execution.runner import run_task
+from handover.scenarios.runs.results.task import InputSources, Task
 from handover.scenarios.study.folder.study_folder import StudyFolder
 from handover.scenarios.study.plan.led_hands import led_hand_of, round_parameters
 from handover.scenarios.study.plan.plan import default_plan, parse_plan

@@ -18,7 +18,7 @@ from support.wording import Wording
 
 from handover.cosim.record.reader import Record
 from handover.scenarios.live.webcam import FILES, MODEL, WebcamFiles
-from handover.scenarios.reporting.page import asset
+from handover.scenarios.runs.reporting.page import asset
 from handover.scenarios.study.folder.study_folder import StudyFolder
 from handover.scenarios.study.plan.plan import default_plan, parse_plan
 from handover.scenarios.study.session.server import page_words

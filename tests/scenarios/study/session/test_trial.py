@@ -10,7 +10,7 @@ from handover.scenarios.study.plan.led_hands import NoHand
 from handover.scenarios.study.session.trial import Trial, TrialFailed, TrialRequest
 
 DARK = """
-from handover.scenarios.free_flyer.handover.hand_practice import HandPractice
+from handover.scenarios.robots.free_flyer.handover.hand_practice import HandPractice
 
 
 class Dark(HandPractice):

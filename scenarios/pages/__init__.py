@@ -1,0 +1,1 @@
+"""Pages of many runs beside each other, and films of one."""

@@ -1,0 +1,211 @@
+"""Writes the page of a campaign from its folder: the header, and the sections that it has."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup
+
+from handover.cosim.exceptions import counted, one_line
+from handover.cosim.files import scratch_folder
+from handover.cosim.typed_data import read_typed
+from handover.scenarios.experiment.display_unit import display_unit
+from handover.scenarios.pages.campaign_report.claims_section import claims_section, comparison_section, verdict_html
+from handover.scenarios.pages.campaign_report.figures import draw_campaign
+from handover.scenarios.pages.campaign_report.pairs_section import pairs_section
+from handover.scenarios.pages.campaign_report.point_layout import layout_of
+from handover.scenarios.pages.campaign_report.points import points_section, success_section
+from handover.scenarios.pages.campaign_report.runs import failures_section, runs_section
+from handover.scenarios.pages.campaign_report.settings import figures_section, setting_section
+from handover.scenarios.pages.campaign_report.spread_section import spread_section
+from handover.scenarios.published.catalog import EXPERIMENTS
+from handover.scenarios.published.published_experiment import (
+    Claim,
+    ComparisonTable,
+    PaperResults,
+    PublishedExperiment,
+    draw_figures,
+    verdict_counts,
+)
+from handover.scenarios.runs.campaign.folder import CampaignFolder
+from handover.scenarios.runs.campaign.results import CampaignResults, read_results
+from handover.scenarios.runs.reporting.page import Section, write_page
+from handover.scenarios.runs.results.run_folder import InvalidRunFolder, disk_errors_reported
+from handover.scenarios.runs.results.tolerated_faults import ToleratedFaults
+
+_MAX_VALUES = 10
+
+
+def campaign_header(results: CampaignResults, claims: Sequence[Claim]) -> Markup:
+    """Return the page's header: what was run, how it went, claims by verdict, and the plan in sentences."""
+    lines = [Markup("<p class='soft'>{}</p>").format(_scenario(results)), _verdict(results)]
+    for beyond, heading in ((False, "The paper's claims"), (True, "Beyond the paper")):
+        counts = verdict_counts(claims, beyond)
+        if counts:
+            verdicts = Markup(", ").join(Markup("{} {}").format(n, verdict_html(v, words)) for n, v, words in counts)
+            lines.append(Markup("<p>{}: {}.</p>").format(heading, verdicts))
+    lines.append(Markup("<p class='soft'>{}</p>").format(f"{_plan(results)} {_cost(results)}".strip()))
+    return Markup("\n").join(lines)
+
+
+def _scenario(results: CampaignResults) -> str:
+    """Describe the scenario by what the page's title lacks: below a paper's title its name, else what it does."""
+    if results.metadata.get("experiment"):
+        return f"Runs of the scenario {results.scenario}."
+    scenario = results.experiment
+    return str(results.metadata.get("title", "" if scenario is None else scenario.title))
+
+
+def _verdict(results: CampaignResults) -> Markup:
+    ended, planned, status = len(results.table), results.planned, results.table.column("status")
+    done, failed, lost = (int(np.count_nonzero(status == s)) for s in ("done", "failed", "lost"))
+    parts = [f"in {results.successes} of {counted(done, 'run')} done the task succeeded"]
+    parts += [f"{failed} failed to run"] if failed else []
+    parts += [f"{counted(lost, 'was', 'were')} lost"] if lost else []
+    sentence = "; ".join(parts) + "."
+    if ended < planned:
+        so_far = Markup("<b>{} of {} runs so far</b>; run the same command again to resume.").format(ended, planned)
+        return Markup("<p class='verdict'>{} {}</p>").format(so_far, sentence[0].upper() + sentence[1:])
+    kind = " bad" if failed or lost else ""
+    return Markup("<p class='verdict{}'><b>{}</b>: {}</p>").format(kind, counted(planned, "run"), sentence)
+
+
+def _plan(results: CampaignResults) -> str:
+    """Describe what was varied and how often each point was run."""
+    metadata = results.metadata
+    varied = [f"{name.replace('_', ' ')} ({_values(results, name)})" for name in results.varied]
+    points, repetitions = len(metadata["points"]), int(metadata["repetitions"])
+    parts = [f"Varied: {'; '.join(varied)}" if varied else "Nothing is varied"]
+    parts.append(f"{counted(points, 'point')}, {counted(repetitions, 'run')} each; campaign's seed {metadata['seed']}")
+    if metadata.get("paired"):
+        parts.append("Runs of a repetition share a seed, so that points can be compared run by run")
+    return ". ".join(parts) + "."
+
+
+def _cost(results: CampaignResults) -> str:
+    """Describe the time that all runs took together."""
+    if not len(results.table):
+        return ""
+    cpu, wall = (float(np.nansum(results.table.column(n).astype(np.float64))) for n in ("cpu_seconds", "wall_seconds"))
+    times = [display_unit("s", seconds).text(seconds) for seconds in (cpu, wall)]
+    return f"The runs took {times[0]} of CPU time, and {times[1]} from beginning to end, added up."
+
+
+def _values(results: CampaignResults, name: str) -> str:
+    texts = list(dict.fromkeys(values[name] for values in results.metadata["points"] if name in values))
+    if results.is_number(name):
+        unit = display_unit(results.unit(name), [float(t) for t in texts])
+        shown = [f"{float(t) * unit.factor:.4g}" for t in texts]
+        symbol = f" {unit.symbol}" if unit.symbol else ""
+    else:
+        shown, symbol = [results.words(name, t) for t in texts], ""
+    if len(shown) > _MAX_VALUES:
+        shown = [*shown[:4], "…", shown[-1]]
+    return ", ".join(shown) + symbol
+
+
+def read_claims(folder: CampaignFolder) -> Sequence[Claim]:
+    """Read a paper's claims with their verdicts; none if the campaign is of no paper, or not complete.
+
+    Raises:
+        InvalidRunFolder: the file is damaged.
+    """
+    file = folder.path / "claims.json"
+    if not file.exists():
+        return ()
+    try:
+        return [Claim.from_data(entry) for entry in read_typed(file, list[dict[str, Any]])]
+    except (OSError, KeyError, TypeError, ValueError) as e:
+        fault = f"its {file.name} is damaged: {one_line(e)}; run the same `handover paper` command again to rewrite it"
+        raise InvalidRunFolder(folder.path, fault) from e
+
+
+def write_campaign_page(folder: CampaignFolder, file: Path | None = None) -> list[str]:
+    """Write a campaign's, or a paper's, page; the campaign need not be complete, and nothing else is written.
+
+    Returns what could not be drawn, a line each.
+
+    Args:
+        folder: the campaign's.
+        file: where the page goes; by default `report.html` in the folder, beside which the runs' pages are linked.
+
+    Raises:
+        InvalidRunFolder: it is not the folder of a campaign, or damaged; nothing is written.
+        RecordNotWritten: the disk is full.
+    """
+    faults = ToleratedFaults(KeyError)
+    with scratch_folder("figures") as figures:
+        _write(folder, read_results(folder), read_claims(folder), None, figures, file, faults)
+    return faults.lines
+
+
+def write_campaign_report(
+    folder: CampaignFolder, file: Path | None = None, paper: PaperResults | None = None
+) -> list[str]:
+    """Write the page, and the figures of the campaign and of its paper into `figures/`.
+
+    Returns what could not be drawn, a line each.
+
+    Args:
+        folder: the campaign's.
+        file: where the page goes, as of `write_campaign_page`.
+        paper: the paper's claims and tables for these runs, if they are made already; else they are read.
+
+    Raises:
+        InvalidRunFolder, RecordNotWritten: as `write_campaign_page`.
+    """
+    results = read_results(folder)
+    claims, tables = (read_claims(folder), None) if paper is None else (paper.claims, paper.tables)
+    faults = ToleratedFaults(KeyError)
+    with disk_errors_reported(folder.figures):
+        draw_campaign(results, folder.figures, faults)
+    _write(folder, results, claims, tables, folder.figures, file, faults)
+    return faults.lines
+
+
+def _write(
+    folder: CampaignFolder,
+    results: CampaignResults,
+    claims: Sequence[Claim],
+    tables: Sequence[ComparisonTable] | None,
+    figures: Path,
+    file: Path | None,
+    faults: ToleratedFaults,
+) -> None:
+    """Write the page; a paper's figures are drawn into a folder, and its tables are made unless they are given."""
+    experiment_type = EXPERIMENTS.get(str(results.metadata.get("experiment", "")))
+    experiment = None if experiment_type is None else experiment_type()
+    sections: list[Section | None] = [claims_section(claims)]
+    if experiment is not None and results.points:
+        with faults.tolerated("what the paper has published could not be shown"):
+            sections += _published(experiment, tables, results, folder.runs, figures)
+    layout = layout_of(results) if results.points else None
+    if layout is not None and layout.fits_a_page:
+        sections += [success_section(results, layout), spread_section(results, layout)]
+    sections += [
+        points_section(results, layout),
+        pairs_section(results),
+        failures_section(results, folder.path),
+        runs_section(results, folder.path),
+        setting_section(results),
+    ]
+    title = results.scenario if experiment is None else f"{experiment.name}: {experiment.title}"
+    write_page(file or folder.report, title, campaign_header(results, claims), [s for s in sections if s is not None])
+
+
+def _published(
+    experiment: PublishedExperiment,
+    tables: Sequence[ComparisonTable] | None,
+    results: CampaignResults,
+    runs: Path,
+    figures: Path,
+) -> Sequence[Section | None]:
+    """Return published values beside ours, and the figures, or a section that says why there are none."""
+    try:
+        tables = experiment.tables(results.table) if tables is None else tables
+        drawn = draw_figures(experiment, results.table, runs, figures)
+    except KeyError as e:
+        html = Markup("<p>The campaign is of another version of {}, so this is left out: its runs have no {}.</p>")
+        return [Section(anchor="comparison", title="Published and ours", html=html.format(experiment.name, e.args[0]))]
+    return [comparison_section(tables), figures_section(drawn, figures)]

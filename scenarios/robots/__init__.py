@@ -1,0 +1,1 @@
+"""The robots: wiring, parameters, evaluation, plots and replay of their scenarios."""

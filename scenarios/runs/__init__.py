@@ -1,0 +1,1 @@
+"""Runs, one and many: carried out, recorded in a folder, shown on a page."""

@@ -1,0 +1,101 @@
+"""Configuration of a campaign's worker pool, workers of this machine or of a Dask scheduler, and its lazy start.
+
+Dask, which takes a while to load, is imported for the workers of a scheduler alone.
+"""
+
+import contextlib
+import functools
+from collections.abc import Callable, Generator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from handover.cosim.exceptions import counted
+from handover.scenarios.runs.campaign.local_pool import LocalPool
+from handover.scenarios.runs.campaign.worker_pool import JobResult, RunJob, WorkerPool, cores
+
+
+@dataclass(frozen=True)
+class PoolConfig:
+    """The workers that a command asks for.
+
+    Attributes:
+        workers: how many on this machine; None for one a core.
+        scheduler: address of a cluster's scheduler, whose workers are used; None for workers on this machine.
+    """
+
+    workers: int | None = None
+    scheduler: str | None = None
+
+    def __str__(self) -> str:
+        """Return such as "2 workers"."""
+        if self.scheduler is not None:
+            return f"the workers of {self.scheduler}"
+        return counted(self.workers or cores(), "worker")
+
+    def check(self) -> None:
+        """Check that a scheduler answers at its address.
+
+        Raises:
+            PoolError: the address is malformed, or no scheduler answers there.
+        """
+        if self.scheduler is not None:
+            _ = self._address
+
+    def start(self) -> contextlib.AbstractContextManager[WorkerPool]:
+        """Return the workers; entering starts them.
+
+        Raises:
+            PoolError: here or on entering, if they cannot be started or used.
+        """
+        if self.scheduler is None:
+            return LocalPool(self.workers)
+        from handover.scenarios.runs.campaign.cluster import connect_cluster
+
+        return connect_cluster(self._address)
+
+    @functools.cached_property
+    def _address(self) -> str:
+        """The complete address of the scheduler, which is asked once."""
+        from handover.scenarios.runs.campaign.scheduler import scheduler_address
+
+        return scheduler_address(self.scheduler or "")
+
+
+class LazyPool:
+    """Starts a worker pool when it is checked, or else with its first job.
+
+    It is checked when the campaign's folder is locked, so that no other command can take the folder while workers
+    start. It is not checked where all runs seem done; if one of them then turns out to be damaged, it is started late.
+
+    Args:
+        start: gives the worker pool.
+        opened: ends it.
+    """
+
+    def __init__(
+        self, start: Callable[[], contextlib.AbstractContextManager[WorkerPool]], opened: contextlib.ExitStack
+    ) -> None:
+        self._start, self._opened = start, opened
+        self._pool: WorkerPool | None = None
+
+    def check(self, folder: Path) -> None:
+        """Start the worker pool and check it.
+
+        Raises:
+            PoolError: it cannot be started or used. RecordNotWritten: as `WorkerPool.check`.
+        """
+        self._pool = self._started(folder)
+
+    def run_jobs(self, jobs: Sequence[RunJob]) -> Generator[JobResult, None, None]:
+        """Let the worker pool run jobs.
+
+        Raises:
+            PoolError, RecordNotWritten: as `check`, if that was not called. ClusterLost: all workers were lost.
+        """
+        pool = self._pool or self._started(Path(jobs[0].runs))
+        return pool.run_jobs(jobs)
+
+    def _started(self, folder: Path) -> WorkerPool:
+        pool = self._opened.enter_context(self._start())
+        pool.check(folder)
+        return pool

@@ -1,0 +1,77 @@
+"""Outputs that feed nothing and are NaN or infinite: the run goes on, and its end tells them."""
+
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from support.commands import call, data_in
+from support.cosim.native_units import native_fmu
+
+import handover
+from handover.cosim.record.reader import Record
+from handover.cosim.system.system import System
+from handover.scenarios.runs.results.not_finite import MAX_LINES, not_finite_lines, outputs_not_finite
+
+NAN_LINE = "unit gives_nan: y = NaN at t = 0.3 s, which no unit reads"
+
+
+@pytest.mark.parametrize(("fmi", "coupling"), [(2, ()), (3, ("--algorithm", "fixed-point"))])
+def test_a_run_ends_with_a_line_and_goes_on_until_then(tmp_path: Path, fmi: int, coupling: tuple[str, ...]):
+    given = ("--stop", "1", "--no-report", "--out", tmp_path / "r")
+    result = call("run", native_fmu("gives_nan", fmi), *given, *coupling)
+    assert result.exit_code == 0, result.output
+    assert NAN_LINE in result.output.splitlines()
+    summary = data_in(tmp_path / "r")
+    assert summary["complete"]
+    (told,) = summary["not_finite"]
+    assert (told["instance"], told["output"], told["value"]) == ("gives_nan", "y", "NaN")
+    assert told["time"] == pytest.approx(0.3)
+    y, metrics = Record(tmp_path / "r" / "signals.parquet")["gives_nan.y"], summary["metrics"]
+    finite = y[np.isfinite(y)]
+    assert [metrics[name]["value"] for name in ("min_y", "max_y")] == [finite.min(), finite.max()]
+    assert metrics["last_y"]["value"] == (float(y[-1]) if np.isfinite(y[-1]) else None)
+    assert ("not a number" in metrics["last_y"]["description"]) == np.isnan(y[-1])
+
+
+def test_page_and_result_have_the_line(tmp_path: Path):
+    ran = handover.run(native_fmu("gives_infinity", 3), stop=1, out=tmp_path / "r")
+    line = "unit gives_infinity: y = -infinity at t = 0.3 s, which no unit reads"
+    assert ran.warnings == (line,)
+    ran.report()
+    page = (tmp_path / "r" / "report.html").read_text(encoding="utf-8")
+    assert line in page.replace("\u202f", " ").replace("\u00a0", " ")
+
+
+def test_a_run_with_finite_outputs_tells_nothing(tmp_path: Path):
+    result = call("run", native_fmu("gives_nan", 3), "--stop", "0.2", "--no-report", "--out", tmp_path / "r")
+    assert result.exit_code == 0, result.output
+    assert "no unit reads" not in result.output
+    assert "not_finite" not in data_in(tmp_path / "r")
+
+
+def record(file: Path, **columns: list[float]) -> Path:
+    pq.write_table(pa.Table.from_arrays([pa.array(v, pa.float64()) for v in columns.values()], list(columns)), file)
+    return file
+
+
+def test_of_an_array_the_first_entry_is_named_and_the_others_counted(tmp_path: Path):
+    wired = System()
+    for name in ("a", "a.b"):  # as of a nested system
+        wired.add(name, native_fmu("gives_nan", 3))
+    wired.connect(wired.units["a"].y.y, wired.units["a.b"].u.u)
+    nan, inf = float("nan"), float("inf")
+    file = record(
+        tmp_path / "signals.parquet",
+        **{"time": [0.0, 0.1, 0.2], "a.y": [0.0, 0.0, inf], "a.fine": [1.0, 2.0, 3.0]},
+        **{"a.b.p[1]": [0.0, 0.0, nan], "a.b.p[2]": [0.0, nan, 0.0], "a.b.p[3]": [0.0, 0.0, 0.0]},
+    )
+    assert not_finite_lines(outputs_not_finite(file, wired)) == [
+        "unit a: y = infinity at t = 0.2 s, which feeds a unit, though no step followed",
+        "unit a.b: p[2] = NaN at t = 0.1 s (another entry too), which no unit reads",
+    ]
+    columns = {f"a.y{n}": [float("nan")] for n in range(MAX_LINES + 3)}
+    lines = not_finite_lines(outputs_not_finite(record(file, time=[0.0], **columns), wired))
+    assert len(lines) == MAX_LINES + 1  # a long list is shortened
+    assert lines[-1].startswith("3 more outputs are not finite")
