@@ -79,5 +79,8 @@ def test_table_1_of_luberto_at_full_size(tmp_path: Path):
     result = paper("ir-table", "--out", tmp_path / "c")
     assert result.exit_code == 0, result.output
     content = {c["claim"]: c["verdict"] for c in data_in(tmp_path / "c", "claims")}
-    for pose in ("nominal", "perturbed"):
-        assert content[f"In {pose} poses the IR-guided hand succeeds more often than the blind one."] == "reproduced"
+    assert content["The IR-guided hand succeeds less often in perturbed poses than in nominal ones."] != "too few runs"
+    for pose in ("nominal", "perturbed"):  # the blind hand's failure was put in by a choice
+        assert (
+            content[f"In {pose} poses the IR-guided hand succeeds more often than the blind one."] == "not comparable"
+        )
