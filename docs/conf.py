@@ -13,6 +13,7 @@ from docutils import nodes
 from nbclient import NotebookClient
 from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
+from sphinx.util.parallel import make_chunks
 
 sys.path.insert(0, str(Path(__file__).parent))
 from equations import show_block, show_inline
@@ -105,14 +106,11 @@ def keep_together(app: Sphinx, doctree: nodes.document, page: str) -> None:  # n
             text.parent.replace(text, nodes.Text(kept))
 
 
-_PARTS = 6
-"""Into which Sphinx divides the site's pages, for its processes to read one after another."""
-
-
 def mix_pages(app: Sphinx, env: object, pages: list[str]) -> None:  # noqa: ARG001
     """Put tutorials, of which some run for minutes, into different parts of the pages that are to be read."""
+    parts = len(make_chunks(pages, app.parallel))  # into which Sphinx divides them for its processes
     first = sorted(pages, key=lambda page: not page.startswith("tutorials/"))
-    pages[:] = [page for k in range(_PARTS) for page in first[k::_PARTS]]
+    pages[:] = [page for k in range(parts) for page in first[k::parts]]
 
 
 def check_links(app: Sphinx, failure: Exception | None) -> None:

@@ -175,7 +175,7 @@ def gallery_run(name: str, files: Path) -> GalleryRun:
     page = f"gallery/{name}/report.html"
     for file in (f for f in run.iterdir() if f.is_file()):  # the page links them
         shutil.copyfile(file, files / f"gallery/{name}/{file.name}")
-    unlink_what_is_missing(files / page)
+    drop_broken_links(files / page)
     summary = json.loads((run / "summary.json").read_text(encoding="utf-8"))
     content = json.loads((run / "run.json").read_text(encoding="utf-8"))
     metrics = {n: MetricRow(n, unit_symbol(m["unit"]), m["description"], format_metric(m))
@@ -185,8 +185,8 @@ def gallery_run(name: str, files: Path) -> GalleryRun:
     return GalleryRun(bool(summary["success"]), summary["reason"], figures, page, diagram, [*ordered.values()])
 
 
-def unlink_what_is_missing(page: Path) -> None:
-    """Keep of a page's links to files that do not lie beside it their text alone."""
+def drop_broken_links(page: Path) -> None:
+    """Replace a page's links to files that are not beside it by their text."""
 
     def linked(found: re.Match[str]) -> str:
         return found[0] if (page.parent / unquote(found[1])).exists() else found[2]

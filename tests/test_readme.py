@@ -232,7 +232,7 @@ def arguments_of(command: str) -> Sequence[str]:
 @pytest.mark.slow
 @pytest.mark.parametrize("command", [c for c in RUNS if not any(text in c for text in (*OF_FILES, " --out "))])
 def test_the_runs_succeed(command: str):
-    """Those of the Helix and the handover for a moment: whole ones are in tests/scenarios/ROBOT."""
+    """Those of the Helix and the handover for a moment: whole ones are in tests/scenarios/robots."""
     begins = ("--stop", "0.2") if " helix_" in command or " flyer_robot_" in command else ()
     summary = json.loads((kept_run(*arguments_of(command), *begins) / "summary.json").read_text())
     assert summary["complete"]

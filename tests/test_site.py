@@ -186,7 +186,7 @@ def test_a_report_in_the_gallery_links_what_lies_beside_it_alone(tmp_path: Path)
     linked = '<td><a href="{0}"><code>{0}</code></a></td>'
     page.write_text(linked.format(there) + linked.format(missing))
     (tmp_path / there).touch()
-    maker("gallery").unlink_what_is_missing(page)
+    maker("gallery").drop_broken_links(page)
     assert page.read_text() == linked.format(there) + "<td><code>figures</code></td>"
 
 

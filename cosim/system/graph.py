@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
+from handover.cosim.exceptions import counted
 
 if TYPE_CHECKING:
     from handover.cosim.system.system import Connection, System
@@ -125,6 +126,11 @@ def rate(period: float | None, *, sampled: bool) -> str:
     return text + (", sampled" if sampled else "")
 
 
+def port_text(output: str, input_: str) -> str:
+    """Return a signal's ports as text: one name where both ends have the same."""
+    return output if output == input_ else f"{output} \N{RIGHTWARDS ARROW} {input_}"
+
+
 def graph_svg(units: Sequence[DrawnUnit], signals: Mapping[Pair, Sequence[str]]) -> str:
     """Return a picture of units and of the signals between them, in the page's colours if it has any.
 
@@ -148,16 +154,16 @@ def graph_svg(units: Sequence[DrawnUnit], signals: Mapping[Pair, Sequence[str]])
     low = drawn.min(axis=0) - _GAP
     width, height = (drawn.max(axis=0) + _GAP - low).round()
     at, curves = {n: p - low for n, p in at.items()}, {pair: points - low for pair, points in curves.items()}
-    colour = {name: f"var(--c{k}, {_COLOURS[k]})" for name, k in zip(names, itertools.cycle(range(9)), strict=False)}
+    colour = {n: f"var(--c{k % len(_COLOURS)}, {_COLOURS[k % len(_COLOURS)]})" for k, n in enumerate(names)}
     heads = {pair: _head(points, at, boxes) for pair, points in curves.items()}
     titles = {(a, b): "\n".join([f"{a} \N{RIGHTWARDS ARROW} {b}", *of]) for (a, b), of in between.items()}
     lines = [_arrow(curves[pair], heads[pair], colour[pair[0]], titles[pair]) for pair in between]
     shown = [_box(u, texts[u.name], at[u.name], boxes[u.name], colour[u.name]) for u in units]
-    label = "; ".join(f"{a} to {b}: {', '.join(listed)}" for (a, b), listed in signals.items())
+    listed = "; ".join(f"{a} to {b}: {', '.join(of)}" for (a, b), of in signals.items())
+    label = html.escape(f"graph of {counted(len(names), 'unit')}. {listed}")
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:g} {height:g}" width="{width:g}" role="img" '
-        f'aria-label="{html.escape(f"graph of {len(names)} units. {label}")}" '
-        f'style="background: var(--page, #fff); font: 12px sans-serif">'
+        f'aria-label="{label}" style="background: var(--page, #fff); font: 12px sans-serif">'
         f"{''.join(lines)}{''.join(shown)}</svg>"
     )
 
@@ -183,7 +189,7 @@ def _move_apart(at: dict[str, Floats], boxes: Mapping[str, Floats]) -> None:
 
 def _signal_text(system: "System", c: "Connection") -> str:
     outputs = system.units[c.source.unit].description.outputs
-    port = c.source.port if c.source.port == c.target.port else f"{c.source.port} \N{RIGHTWARDS ARROW} {c.target.port}"
+    port = port_text(c.source.port, c.target.port)
     return f"{port} ({outputs[c.source.port].signature})" if c.source.port in outputs else port
 
 
@@ -201,7 +207,8 @@ def _arrow(points: Floats, head: int, colour: str, title: str) -> str:
     angle = float(np.degrees(np.arctan2(along[1], along[0])))
     place = f"translate({middle[0]:.1f} {middle[1]:.1f}) rotate({angle:.1f})"
     return (
-        f'<g><title>{html.escape(title)}</title><polyline points="{path}" fill="none" stroke="{colour}" '
+        f'<g><title>{html.escape(title)}</title><polyline points="{path}" fill="none" stroke="transparent" '
+        f'stroke-width="12"/><polyline points="{path}" fill="none" stroke="{colour}" '
         f'stroke-width="1.8"/><path d="M-7 -6 L7 0 L-7 6 Z" fill="{colour}" transform="{place}"/></g>'
     )
 

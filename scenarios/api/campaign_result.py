@@ -119,9 +119,8 @@ class Campaign:
         """
         with errors_for_python():
             require_extra("reports", "reports")
-        from handover.scenarios.pages.campaign_report.campaign_page import (
-            write_campaign_page,  # Plotly takes long to load
-        )
+        # Plotly takes long to load.
+        from handover.scenarios.pages.campaign_report.campaign_page import write_campaign_page
 
         with errors_for_python():
             write_campaign_page(self._place)

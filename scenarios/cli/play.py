@@ -120,10 +120,10 @@ def _session(
 
 
 async def _serve(session: "Session") -> None:
+    from handover.scenarios.live.page_server import ended_by_signals
     from handover.scenarios.live.play_page import PlayPage
     from handover.scenarios.live.process import HOST
     from handover.scenarios.live.server import serve
-    from handover.scenarios.live.serving import ended_by_signals
 
     page = PlayPage(session)
     with socket.create_server((HOST, 0)) as listening, ended_by_signals(page.end):

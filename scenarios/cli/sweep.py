@@ -164,9 +164,8 @@ def _finish(outcome: CampaignOutcome, *, as_json: bool, report: bool) -> None:
         print_campaign(results, outcome.counts, folder)
     if report and not folder.is_reported:
         with doing("drawing figures, writing the report"):
-            from handover.scenarios.pages.campaign_report.campaign_page import (
-                write_campaign_report,  # takes long to load
-            )
+            # Takes long to load.
+            from handover.scenarios.pages.campaign_report.campaign_page import write_campaign_report
 
             for line in write_campaign_report(folder):
                 say(line)

@@ -54,7 +54,7 @@ FmuOf = Callable[[str], Path]
 
 @dataclass(frozen=True)
 class Metric(Checked):
-    """A figure of merit in a run's summary."""
+    """A metric in a run's summary."""
 
     value: float
     unit: str = "1"

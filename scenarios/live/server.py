@@ -18,8 +18,8 @@ from starlette.routing import Route, WebSocketRoute
 
 from handover.cosim.master.live_control import LiveControl
 from handover.scenarios.live.live_page import LivePage
+from handover.scenarios.live.page_server import PageServer
 from handover.scenarios.live.process import CONTROL_FILE, HOST, wait_for_end_of_input
-from handover.scenarios.live.serving import PageServer
 from handover.scenarios.live.shown_run import ShownRun
 from handover.scenarios.live.watched_run import WatchedRun
 from handover.scenarios.live.webcam import WebcamFiles

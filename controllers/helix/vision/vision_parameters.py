@@ -10,11 +10,6 @@ from handover.cosim.blocks.ports import parameter
 from handover.cosim.blocks.start_values import parameter_faults
 from handover.cosim.blocks.units import Metre, MetrePerSecond, Pixel, RadianPerSecond
 
-_CORNER_SHIFT, _EDGE_SHIFT = (
-    0.24,
-    -0.005,
-)  # px, by scenarios/robots/helix/calibrate_detector.py
-
 
 class InvalidVisionParameters(InvalidParameters):
     """Parameters out of range; `faults` lists all of them."""
@@ -55,7 +50,7 @@ class Params(CamerasAndMarkers):
         origin=assumed("own choice: of refined corners in pictures with such noise and blur"),
     )
     corner_shift: Pixel = parameter(
-        _CORNER_SHIFT,
+        0.24,
         "how far refined corners lie inside of the printed ones, along the diagonal",
         minimum=-2.0,
         maximum=2.0,
@@ -69,7 +64,7 @@ class Params(CamerasAndMarkers):
         origin=assumed("own choice: of the ball's outline in pictures with such noise and blur"),
     )
     edge_shift: Pixel = parameter(
-        _EDGE_SHIFT,
+        -0.005,
         "mean shift of the ball's edge outwards",
         minimum=-3.0,
         maximum=3.0,

@@ -129,9 +129,8 @@ def offered(p: ReflexGraspParameters, seed: int) -> Parameters:
     """Return the handover with the ball where it is offered; a place is drawn by the seed."""
     if p.offer is Offer.GIVEN:
         return p.handover
-    from handover.scenarios.robots.helix.workspace import (
-        random_place,  # OpenCV is slow to import, and lists import this
-    )
+    # OpenCV is slow to import, and lists import this.
+    from handover.scenarios.robots.helix.workspace import random_place
 
     azimuth, radius, height = random_place(np.random.default_rng(seed))
     return replace(p.handover, azimuth=azimuth, radius=radius, height=height)

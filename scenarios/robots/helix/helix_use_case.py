@@ -164,9 +164,8 @@ class HelixUseCase(HelixHandover):
     def build(self, parameters: Any, seed: int, fmu: FmuOf) -> System:
         """Wire the handover's units, with a bowl; a place to drop the ball that the arm does not reach is a fault."""
         p: UseCaseParameters = parameters
-        from handover.scenarios.robots.helix.workspace import (
-            short_of_reach,  # OpenCV is slow to import, and lists import this
-        )
+        # OpenCV is slow to import, and lists import this.
+        from handover.scenarios.robots.helix.workspace import short_of_reach
 
         s = super().build(p, seed, fmu)
         if short := short_of_reach(p.p_WG_drop, _REACHED):

@@ -158,9 +158,8 @@ class VslPickAndPlace(Experiment[PickAndPlaceEvaluator]):
         folder: Path,
     ) -> list[Figure]:
         """Draw the way of the tip and of the object, and the arm as it picks up and as it puts down."""
-        from handover.scenarios.robots.vsl.pick_and_place_plots import (
-            draw_pick_and_place,  # matplotlib is slow to import
-        )
+        # Matplotlib is slow to import.
+        from handover.scenarios.robots.vsl.pick_and_place_plots import draw_pick_and_place
 
         return draw_pick_and_place(parameters, record, folder)
 

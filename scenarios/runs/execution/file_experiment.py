@@ -139,9 +139,8 @@ def system_experiment(
             return _metrics(signals, prefix)
 
         def time_figures(self, parameters: Any, record: Record) -> list[TimeFigure]:  # noqa: ARG002
-            from handover.scenarios.runs.reporting.run_figures import (
-                figures_of_outputs,  # what draws takes long to load
-            )
+            # What draws takes long to load.
+            from handover.scenarios.runs.reporting.run_figures import figures_of_outputs
 
             return figures_of_outputs(system.units, record)
 

@@ -11,7 +11,7 @@ from markupsafe import Markup
 
 from handover.cosim.exceptions import counted
 from handover.cosim.system.conversion import LinearTransformation
-from handover.cosim.system.graph import DrawnUnit, Pair, graph_svg, rate
+from handover.cosim.system.graph import DrawnUnit, Pair, graph_svg, port_text, rate
 from handover.fmus.contents.icons import catalog_icon
 from handover.scenarios.runs.reporting.html import picture_source
 from handover.scenarios.runs.reporting.page import Section, template
@@ -56,8 +56,7 @@ def _signals(names: Collection[str], connections: Sequence[Mapping[str, Any]]) -
     texts: dict[Pair, list[str]] = {}
     for c in connections:
         (source, output), (target, input_) = (_split_port(c[end], names) for end in ("source", "target"))
-        port = output if output == input_ else f"{output} \N{RIGHTWARDS ARROW} {input_}"
-        texts.setdefault((source, target), []).append(f"{port}{_form(c)}")
+        texts.setdefault((source, target), []).append(f"{port_text(output, input_)}{_form(c)}")
     return {pair: [*of[:_MAX_LISTED], *_more(len(of) - _MAX_LISTED)] for pair, of in texts.items()}
 
 

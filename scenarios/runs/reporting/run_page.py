@@ -190,7 +190,7 @@ def metrics_section(facts: RunFacts) -> Section | None:
     first = [n for n in facts.headline if n in metrics]
     others = [n for n in metrics if n not in first and not n.startswith(_IN_TABLES)]
     rows = [(metrics[n].get("description") or n, format_metric(metrics[n]), n) for n in first + others]
-    return _table("figures", "Metrics", rows, first=len(first))
+    return _table("metrics", "Metrics", rows, first=len(first))
 
 
 def parameters_section(facts: RunFacts) -> Section | None:
@@ -256,7 +256,7 @@ def published_section(facts: RunFacts) -> Section | None:
     rows = [_published_row(v, metrics[v.metric]) for v in _published_values(facts) if v.metric in metrics]
     if not rows:
         return None
-    note = "One run does not test what was published: it does not show how they vary."
+    note = "One run does not test what was published: it does not show how its metrics vary."
     html = rows_table(("metric", "this run", "published", "where"), rows, numbers=(1, 2), cards=True)
     return Section(
         anchor="published", title="Published values", html=html + Markup("<p class='soft'>{}</p>").format(note)

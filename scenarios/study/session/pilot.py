@@ -230,7 +230,7 @@ class ScriptedPilot:
             if "refused" in content or "gone" in content:
                 raise PilotRefused(str(content.get("refused") or content.get("gone")))
             if "scene" in content:
-                self._scene, self._hand = SeenScene(content["scene"]), None
+                self._scene, self._hand, self._drawn = SeenScene(content["scene"]), None, []
                 await self._send({"ready": True})
             elif "target" in content:
                 self._target = content["target"]
@@ -290,7 +290,7 @@ class ScriptedPilot:
             self._hand = ScriptedHand(scene)
         self._hand.act(self._target)
         await self._send({"hand": hand_message(self._hand.place, self._hand.closed, time.monotonic())})
-        if len(self._drawn) >= 60:
+        if len(self._drawn) >= 5:
             drawn, self._drawn = self._drawn, []
             await self._send({"drawn": drawn})
 

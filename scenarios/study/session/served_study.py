@@ -8,7 +8,7 @@ from pathlib import Path
 
 from websockets.exceptions import ConnectionClosed
 
-from handover.scenarios.live.serving import PageServer, ended_by_signals
+from handover.scenarios.live.page_server import PageServer, ended_by_signals
 from handover.scenarios.live.webcam import WebcamFiles
 from handover.scenarios.study.folder.session_folder import RoundRecord, pseudonym_of
 from handover.scenarios.study.folder.study_folder import StudyFolder

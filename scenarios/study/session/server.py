@@ -21,7 +21,7 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
 from handover.scenarios.live.connections import HEADERS, POLICY_VIOLATION, is_same_origin
-from handover.scenarios.live.serving import PageServer
+from handover.scenarios.live.page_server import PageServer
 from handover.scenarios.live.webcam import WEBCAM_SCRIPTS, WebcamFiles
 from handover.scenarios.runs.reporting.html import json_html
 from handover.scenarios.runs.reporting.page import asset, plain_page_html, template

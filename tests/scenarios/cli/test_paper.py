@@ -78,9 +78,9 @@ def test_quick_plans_of_the_vsl_arm_at_full_length(experiment: str, tmp_path: Pa
 def test_table_1_of_luberto_at_full_size(tmp_path: Path):
     result = paper("ir-table", "--out", tmp_path / "c")
     assert result.exit_code == 0, result.output
-    content = {c["claim"]: c["verdict"] for c in data_in(tmp_path / "c", "claims")}
-    assert content["The IR-guided hand succeeds less often in perturbed poses than in nominal ones."] != "too few runs"
+    verdicts = {c["claim"]: c["verdict"] for c in data_in(tmp_path / "c", "claims")}
+    fewer = "The IR-guided hand succeeds less often in perturbed poses than in nominal ones."
+    assert verdicts[fewer] in ("reproduced", "not reproduced")
     for pose in ("nominal", "perturbed"):  # the blind hand's failure was put in by a choice
-        assert (
-            content[f"In {pose} poses the IR-guided hand succeeds more often than the blind one."] == "not comparable"
-        )
+        more = f"In {pose} poses the IR-guided hand succeeds more often than the blind one."
+        assert verdicts[more] == "not comparable"

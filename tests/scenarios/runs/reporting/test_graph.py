@@ -69,7 +69,7 @@ def test_signals_of_a_pair_share_an_arrow_that_names_them():
         [connection("arm.p_WG", "hand.p_WG", size=3), connection("arm.grip", "hand.grip", unit="1"),
          connection("hand.f_G", "arm.f", unit="N", size=3)],
     )  # fmt: skip
-    assert html.count("<polyline") == 2
+    assert html.count('<path d="M-7') == 2
     assert ("2 units<" in html, "3 connections<" in html) == (True, True)
     assert ("1 unit<" in html_of(["arm"], []), "0 connections<" in html_of(["arm"], [])) == (True, True)
     assert "<title>arm → hand\np_WG (m, x 3)\ngrip</title>" in html
@@ -84,7 +84,7 @@ def test_each_unit_has_its_icon_and_one_colour_for_its_box_and_what_leaves_it():
     assert icons_in(html) == [picture_source(catalog_icon(n).read_bytes(), SVG) for n in icons]
     of_boxes = re.findall(r'<rect [^>]*stroke="(.*?)"', html)
     assert len(set(of_boxes)) == 3
-    assert re.findall(r'<polyline [^>]*stroke="(.*?)"', html) == of_boxes[:2]
+    assert re.findall(r'<path d="M-7[^>]*fill="(.*?)"', html) == of_boxes[:2]
 
 
 @pytest.mark.parametrize("n", [2, 5, 12, 40])

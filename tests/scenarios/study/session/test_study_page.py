@@ -223,7 +223,7 @@ def test_a_scripted_pilot_plays_rounds_that_survive_a_kill(without: str, repetit
     assert not rounds["void"].any()
     if not without:
         assert rounds["success"].sum() >= 9, rounds[["task", "behaviour", "reason"]].to_string()
-    assert rounds["latency_p95_ms"].notna().any()  # a short round on a busy machine may be drawn too seldom
+    assert rounds["latency_p95_ms"].notna().all()
     assert len(pd.read_csv(session_folder / "answers.csv")) == 3 * len(session.rounds)
     assert session.session.device == "script"
     again = run_command("study", "replay", out, "P01", session.rounds[-1].number, "--check")

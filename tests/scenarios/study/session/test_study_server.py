@@ -71,18 +71,22 @@ def test_a_server_on_all_addresses_names_one_that_others_can_open(family: socket
     assert address.path == server.path
 
 
-def test_ctrl_c_ends_it_from_the_moment_on_that_it_is_told_of(tmp_path: Path):
-    told = list[str]()
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_signals_end_it_from_the_moment_on_that_its_address_is_printed(number: signal.Signals, tmp_path: Path):
+    told, before = list[str](), signal.signal(number, signal.default_int_handler)  # under nohup one is ignored
 
     def tell(line: str) -> None:
         told.append(line)
-        os.kill(os.getpid(), signal.SIGINT)
+        os.kill(os.getpid(), number)
 
     served = serve_study(
         PLAN, tmp_path / "out", host=HOST, port=0, number=None, pace=1.0, pilot=False, webcam=None, photodiode=False,
         tell=tell,
     )  # fmt: skip
-    asyncio.run(served)  # no KeyboardInterrupt
+    try:
+        asyncio.run(served)  # no KeyboardInterrupt
+    finally:
+        signal.signal(number, before)
     assert "Ctrl-C ends it" in told[0]
 
 

@@ -1,4 +1,4 @@
-"""How pages are served, of a run or of a study: requests that are bounded, and an end in order at signals."""
+"""The server of pages of runs and studies, with bounded requests, and how signals end it in order."""
 
 import asyncio
 import contextlib
@@ -12,11 +12,11 @@ from handover.scenarios.live.connections import BACKLOG, BoundedConnection
 
 
 class PageServer(uvicorn.Server):
-    """A server of pages that leaves signals to who serves them.
+    """A server of pages; whoever runs it handles signals.
 
     Args:
         application: what is served.
-        longest: length of the longest message that a page sends, in bytes.
+        longest: characters of the longest message that a page sends; in UTF-8 one has 4 bytes at most.
         grace: time that what is under way has to end when the server does, s.
     """
 
