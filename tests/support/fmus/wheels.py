@@ -13,7 +13,12 @@ ROOT = Path(__file__).parents[3]
 
 def copy_sources(folder: Path) -> Path:
     """Copy the sources with what builds them, `build-tools`, to a folder, and return that."""
-    ignored = shutil.ignore_patterns(".*", "bin", "build", "dist", "tests", "runs", "*.egg-info", "__pycache__")
+
+    def ignored(place: str, names: list[str]) -> set[str]:
+        at_root = ("tests", "runs") if Path(place) == ROOT else ()
+        patterns = (".*", "bin", "build", "dist", "*.egg-info", "__pycache__", *at_root)
+        return shutil.ignore_patterns(*patterns)(place, names)
+
     shutil.copytree(ROOT, folder, symlinks=True, ignore=ignored)
     tools = folder / "build-tools"
     (zig,) = re.findall(r'"ziglang==([\d.]+)"\]', (ROOT / "pyproject.toml").read_text())
