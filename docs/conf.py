@@ -10,6 +10,7 @@ from pathlib import Path
 from urllib.parse import unquote
 
 from docutils import nodes
+from jupyter_cache import get_cache
 from nbclient import NotebookClient
 from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
@@ -106,6 +107,11 @@ def keep_together(app: Sphinx, doctree: nodes.document, page: str) -> None:  # n
             text.parent.replace(text, nodes.Text(kept))
 
 
+def make_cache(app: Sphinx) -> None:
+    """Make the cache of executed tutorials, which two processes that read pages would make at once, and fail."""
+    get_cache(app.config.nb_execution_cache_path).db  # noqa: B018
+
+
 def mix_pages(app: Sphinx, env: object, pages: list[str]) -> None:  # noqa: ARG001
     """Put tutorials, of which some run for minutes, into different parts of the pages that are to be read."""
     parts = len(make_chunks(pages, app.parallel))  # into which Sphinx divides them for its processes
@@ -145,6 +151,7 @@ def setup(app: Sphinx) -> None:
     app.add_html_math_renderer("mathml", (show_inline, None), (show_block, None))
     app.connect("build-finished", check_links)
     app.connect("build-finished", check_sentences)
+    app.connect("builder-inited", make_cache)
     app.connect("env-before-read-docs", mix_pages)
     app.connect("doctree-resolved", keep_together)
     app.connect("sphinx-click-process-description", set_columns)
