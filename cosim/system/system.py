@@ -383,10 +383,10 @@ class System:
         """Return its units' names."""
         return f"<system of {', '.join(self.units) or 'no units'}>"
 
-    def _repr_html_(self) -> str:
+    def _repr_html_(self) -> str | None:  # None: a notebook shows the names
         from handover.cosim.system.graph import system_svg  # of notebooks alone
 
-        return system_svg(self)
+        return system_svg(self) if self.units else None
 
     @property
     def untouched_faults(self) -> dict[Path, str]:

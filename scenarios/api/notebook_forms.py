@@ -73,7 +73,7 @@ def _time_figures(facts: RunFacts, record: Record) -> tuple[Sequence[TimeFigure]
     """Return the scenario's figures over time, else those of all outputs, and what is left out of them."""
     experiment = facts.experiment
     if experiment is None:
-        from handover.scenarios.runs.reporting.run_figures import figures_of_outputs  # likewise
+        from handover.scenarios.runs.reporting.run_figures import figures_of_outputs  # draws by matplotlib, too
 
         return figures_of_outputs(facts.run.get("units", {}), record), ()
     known = LackingRecord(record, experiment.units)

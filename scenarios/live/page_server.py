@@ -12,7 +12,7 @@ from handover.scenarios.live.connections import BACKLOG, BoundedConnection
 
 
 class PageServer(uvicorn.Server):
-    """A server of pages; whoever runs it handles signals.
+    """A server of pages, which handles no signals itself.
 
     Args:
         application: what is served.

@@ -114,10 +114,9 @@ class HelixHandover(Experiment[HandoverEvaluator]):
         hand_seed, camera_seed, click_seed, servo_seed = (
             int(n) for n in np.random.SeedSequence(seed).generate_state(4) >> 1
         )
-        from handover.controllers.helix.vision.calibration import (
-            TooFewCorners,  # OpenCV is slow to import, and lists import this
-        )
-        from handover.scenarios.robots.helix.workspace import notes_on_place  # likewise
+        # OpenCV is slow to import, and lists import this.
+        from handover.controllers.helix.vision.calibration import TooFewCorners
+        from handover.scenarios.robots.helix.workspace import notes_on_place
 
         s = System()
         s.notes += notes_on_place(p.p_WO, p.cameras, p.marker)
