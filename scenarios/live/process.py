@@ -140,11 +140,11 @@ def live_page(
 def _let_go_without(
     server: "subprocess.Popen[bytes]", control: LiveControl, inputs: PageInputs, over: threading.Event
 ) -> None:
-    """If the page's server exits before the run, release all pushes and resume a paused run."""
-    server.wait()
-    if not over.is_set():
-        inputs.let_go()
-    if not over.is_set() and control.paused:
+    """If the page's server fails before the run has ended, release all pushes and resume a paused run."""
+    if server.wait() == 0 or over.is_set():  # by itself it ends after the run
+        return
+    inputs.let_go()
+    if control.paused:
         control.paused = False
         print("the live page has ended; the run goes on without it", file=sys.stderr)
 

@@ -1,6 +1,9 @@
 """Samples of inputs from outside pass from one process to another, whole, with their age."""
 
 import multiprocessing
+import subprocess
+import sys
+import threading
 import time
 from multiprocessing.synchronize import Event
 from pathlib import Path
@@ -9,6 +12,8 @@ import numpy as np
 import pytest
 from support.wording import Wording
 
+from handover.cosim.master.live_control import LiveControl
+from handover.scenarios.live.process import PageInputs, _let_go_without
 from handover.scenarios.live.shared_inputs import NEVER, SharedInputs, UnknownInput
 
 SIZES = {"person.p": 3, "person.closed": 1, "push.f": 40}
@@ -110,3 +115,11 @@ def test_a_writer_that_was_killed_within_a_sample_stops_no_reader(tmp_path: Path
     np.testing.assert_array_equal(sources["person.closed"].at(0.016), [1.0])
     assert SharedInputs(tmp_path / "inputs").set({"person.closed": 0.0}, time.monotonic()) == 3
     np.testing.assert_array_equal(sources["person.closed"].at(0.032), [0.0])
+
+
+@pytest.mark.parametrize("status", [0, 1])
+def test_a_run_goes_on_without_a_server_that_fails_and_not_without_one_that_ends_after_it(status: int, tmp_path: Path):
+    control = LiveControl.create(tmp_path / "control", 1.0, paused=True)
+    server = subprocess.Popen([sys.executable, "-c", f"raise SystemExit({status})"])
+    _let_go_without(server, control, PageInputs.create(tmp_path, {"push": 3}, None), threading.Event())
+    assert control.paused == (status == 0)
