@@ -2,9 +2,10 @@
 
 import contextlib
 import errno
+import io
 import os
 import sys
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from handover.cosim.imported_elsewhere import ImportedElsewhere
 from handover.cosim.python_process import import_path
@@ -33,11 +34,43 @@ def open_standard_streams() -> None:
             setattr(sys, name, open(number, mode, encoding="utf-8", closefd=False))  # noqa: SIM115
 
 
+class _Terminal(io.FileIO):
+    """A terminal to write to; once it was closed nobody reads, and what is written is dropped, so that a run goes on.
+
+    The system ends a run by SIGHUP then, after its step, with record and report.
+    """
+
+    def write(self, text: Any, /) -> int:
+        try:
+            return super().write(text)
+        except OSError as e:
+            if e.errno != errno.EIO:
+                raise
+            return len(text)
+
+
+def outlive_terminals() -> None:
+    """Let what this process prints on a terminal be dropped once that was closed, in place of an error."""
+    if sys.platform == "win32":
+        return
+    for number, name in ((1, "stdout"), (2, "stderr")):
+        stream = getattr(sys, name)
+        if stream.isatty():
+            setattr(sys, name, terminal_stream(number, stream.encoding, stream.errors))
+
+
+def terminal_stream(number: int, encoding: str, errors: str) -> io.TextIOWrapper:
+    """Return a stream that writes lines to a terminal, open under a number, for as long as somebody reads them."""
+    terminal = io.BufferedWriter(_Terminal(number, "w", closefd=False))
+    return io.TextIOWrapper(terminal, encoding, errors, line_buffering=True)
+
+
 def main() -> None:
     """Run the command; loading it takes a second or so, during which Ctrl-C aborts it as later."""
     sys.path[:] = import_path()
     ImportedElsewhere.install()
     open_standard_streams()
+    outlive_terminals()
     try:
         if sys.argv[1:2] and sys.argv[1] in _SUPERVISED:
             from handover.scenarios.runs.execution.supervisor import can_supervise, run_to_end, supervise

@@ -8,6 +8,8 @@ import pytest
 from support.commands import Ended, data_in, run_command
 from support.faults.faulty_units import faulty_fmu
 
+from handover.scenarios.cli.entry import terminal_stream
+
 PROGRAM = """
 import sys
 from handover.scenarios.cli.entry import open_standard_streams
@@ -29,6 +31,20 @@ def test_closed_streams_lead_nowhere(closed: str, tmp_path: Path):
     done = subprocess.run(["sh", "-c", f'"$@" {closed}', "sh", *call], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert made.read_text() == "only what is meant for it"
+
+
+@pytest.mark.skipif(not hasattr(os, "openpty"), reason="there are no terminals of this kind")
+def test_what_is_printed_on_a_closed_terminal_is_dropped():
+    ours, its = os.openpty()
+    stream = terminal_stream(its, "utf-8", "strict")
+    print("read", file=stream)
+    assert os.read(ours, 64) == b"read\r\n"
+    os.close(ours)
+    print("read by nobody", file=stream, flush=True)
+    stream.close()
+    with pytest.raises(OSError, match="Input/output"):
+        os.write(its, b"the terminal is closed")
+    os.close(its)
 
 
 def ran(fmu: Path, folder: Path, *options: str) -> Ended:
