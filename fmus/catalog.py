@@ -281,7 +281,8 @@ def import_class(path: str) -> type[Any]:
     if not colon:
         raise UnknownBlock(path, "there is no ':' between module and class, as in my_arm:MyArm")
     if not all(part.isidentifier() for part in (*module_name.split("."), name)):
-        raise UnknownBlock(path, "expected the names of a module and of a class in it, as in my_arm:MyArm")
+        known = "a module, installed or in the working directory"
+        raise UnknownBlock(path, f"expected {known}, and a class in it, as in my_arm:MyArm")
     try:
         module = import_module(module_name)
     except (Exception, SystemExit) as e:  # a module may raise anything while it is loaded

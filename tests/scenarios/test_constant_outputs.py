@@ -123,9 +123,8 @@ def test_an_evaluator_that_fails_leaves_a_whole_run_that_is_not_judged(
     assert not ended.outcome.success
     assert ended.failure is None
     assert summary["complete"]
-    reason = summary["reason"].removeprefix("ended at 0.128 s, as asked: ")
-    assert reason.startswith("not judged: ")
-    assert "ZeroDivisionError: no time has passed" in reason
+    assert summary["reason"].startswith("not judged: ")
+    assert "ZeroDivisionError: no time has passed" in summary["reason"]
 
 
 def test_a_fault_is_one_short_line_with_its_place():

@@ -80,7 +80,13 @@ def metric_rows(entries: Sequence[RunEntry]) -> list[MetricRow]:
 
 
 def _description(name: str, descriptions: Sequence[str]) -> str:
-    """Return what a metric is in all runs: some add in brackets what holds of one run, as "(sees nothing)"."""
+    """Return what a metric is in all runs.
+
+    Some add what is so in one run: in brackets, as "(sees nothing)", or, of a number that is a choice, after a colon.
+    """
+    parts = [d.partition(": ") for d in descriptions]
+    if len({topic for topic, _, _ in parts}) == 1:
+        return "".join(parts[0][:2]) + "; ".join(dict.fromkeys(rest for *_, rest in parts))
     shortest = min(descriptions, key=len)
     if any(not d.startswith(shortest) for d in descriptions):
         shortest = re.sub(r" \([^()]*\)$", "", shortest)

@@ -275,12 +275,14 @@ def _one_curve(runs: Runs) -> Claim:
     errors = {rho: float(np.abs(found - target).max()) for rho, found in seen.items() if len(found)}
     if not errors:
         return says.unknown()
+    lacking = [f"{rho:g}" for rho in within if rho not in errors]
     return says.judged(
         "; ".join(f"{1e3 * error:.1f} mm at {rho:g}" for rho, error in errors.items()),
         max(errors.values()) < allowed,
         "it is so in each run",
-        "The bound is that part of the reflex's threshold of cost which each of two fingers has.",
-        enough=len(errors) > 1,
+        "The bound is that part of the reflex's threshold of cost which each of two fingers has."
+        + (f" There are no runs at {', '.join(lacking)}." if lacking else ""),
+        enough=not lacking,
     )
 
 

@@ -102,7 +102,7 @@ def run_task(
     system = experiment_system(experiment, parameters, task.seed, task.fmus, task.unit_values, task.options)
     if task.pushed:
         let_push(system, experiment.pushes(parameters))
-    give_inputs(system, task.inputs)
+    give_inputs(system, task.sources)
     try:
         record_variables(system, task.recorded)
     except WiringError as e:
@@ -276,7 +276,7 @@ def _outcome(
     if master.ended is not None:
         return replace(seen, reason=f"{seen.reason}; {master.ended.summary}")
     if task.is_cut_short and not evaluator.over and master.time >= float(task.stop_time):
-        return replace(seen, success=False, reason=f"ended at {master.time:g} s, as asked: {seen.reason}")
+        return replace(seen, success=False, reason=f"{seen.reason}; it was to end at {master.time:g} s")
     return seen
 
 

@@ -161,6 +161,9 @@ def test_metrics_stand_beside_each_other(tmp_path: Path):
     rows = metric_rows(runs(first, second))
     assert [(r.name, r.description) for r in rows] == [("gap", "gap"), ("x", "gap")]
     np.testing.assert_array_equal([[*r.values.values()] for r in rows], [[0.2, np.nan], [0.1, np.nan]])
+    stops = [metric(k, "1", f"why, by number: {k} is {name}") for k, name in ((1, "patience"), (5, "blind"))]
+    stopped = [run(tmp_path / f"stop{k}", [0.0, 1.0], {}, metrics={"stop": stop}) for k, stop in enumerate(stops)]
+    assert metric_rows(runs(*stopped))[0].description == "why, by number: 1 is patience; 5 is blind"
     third = run(tmp_path / "c", [0.0, 1.0], {}, metrics={"x": metric(1.0, "s")})
     with pytest.raises(NotComparable, match=f"{third}: its metric x is in s, not in m"):
         metric_rows(runs(first, second, third))

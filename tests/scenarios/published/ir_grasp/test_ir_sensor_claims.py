@@ -63,6 +63,15 @@ def test_one_curve_is_judged_by_its_worst_error_at_the_target(error: float, hold
     assert (claim.verdict is Verdict.REPRODUCED) is holds
 
 
+def test_one_curve_has_no_verdict_where_a_reflectivity_was_not_run():
+    def unmeasured(run: PlannedRun) -> float | None:
+        return None if run.parameters["reflectivity"] == "1.5" else 0.010
+
+    claim = one(IrSensorCurve().claims(sensor_table(apparent_at_10_mm=unmeasured)), "With one curve")
+    assert claim.verdict is Verdict.NOT_COMPARABLE
+    assert "1.5" in claim.reason
+
+
 def test_a_distance_that_most_runs_do_not_see_is_told_as_not_seen():
     def unseen(run: PlannedRun) -> float | None:
         return None if run.parameters["reflectivity"] == "0.2" and run.parameters["finger"] != "ring" else 0.06
