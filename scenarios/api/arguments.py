@@ -310,7 +310,7 @@ def formats_of(formats: Sequence[str]) -> tuple[str, ...]:
     given = several_texts("formats", formats)
     if wrong := [f for f in given if f not in RECORD_FORMATS]:
         raise InvalidInput(f"formats: {'; '.join(f'{f!r}: {nearest(str(f), RECORD_FORMATS)}' for f in wrong)}")
-    return given
+    return tuple(dict.fromkeys(given))
 
 
 def master_options(

@@ -213,7 +213,7 @@ def run(
             step=step,
             inputs=inputs,
             sources=None if inputs_from is None else played_back(inputs_from),
-            formats=formats,
+            formats=tuple(dict.fromkeys(formats)),
             recorded=recorded,
             every=every,
             presented=not no_report,
@@ -226,7 +226,7 @@ def run(
         observer: Observer | None = None
         if live or controls:
             task, control, observer = opened.enter_context(_live(task, pace, controls, webcam))
-        elif task.inputs is None and task.experiment.led_hand(task.parameters) is not None:
+        elif task.sources is None and task.experiment.led_hand(task.parameters) is not None:
             say("no hand input: the hand stays at its start: --live lets a page lead it")
         with contextlib.ExitStack() as bar:
             progress, ending = bar.enter_context(progress_bar(sys.stderr)), RunEnding(task, bar, json_to)
@@ -270,7 +270,7 @@ def _live(
     """
     from handover.scenarios.live.process import controlled_from, live_page
 
-    scenario, free = task.experiment, task.inputs is None
+    scenario, free = task.experiment, task.sources is None
     pushes: Mapping[str, int] = inputs_of_pushes(scenario.pushes(task.parameters)) if task.pushed and free else {}
     if task.pushed and free and not pushes:
         raise UsageError(f"--push: nothing can be pushed in {scenario.name}")
@@ -288,5 +288,5 @@ def _live(
             )
             say(f"live: {address}  (the run begins once the page is open)")
         if sources := inputs.sources():
-            task = replace(task, inputs=InputSources(sources, {"from": "page"}))
+            task = replace(task, sources=InputSources(sources, {"from": "page"}))
         yield task, control, inputs.pictures

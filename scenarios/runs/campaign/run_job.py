@@ -63,21 +63,13 @@ def _task(job: RunJob, folder: Path, opened: contextlib.ExitStack) -> Task:
         stop=job.stop,
         step=job.step,
         inputs=Path(job.inputs) if job.inputs else None,
-    )
-    asked = request.open_point(opened)
-    return Task(
-        experiment=asked.experiment,
-        parameters=asked.parameters,
-        unit_values=asked.unit_values,
         seed=job.seed,
-        fmus={name: Path(path) for name, path in job.fmus.items()},
-        folder=RunFolder(folder),
         options=job.options,
-        stop=asked.stop,
-        source=asked.source,
         recorded=job.recorded,
         presented=False,
     )
+    fmus = {name: Path(path) for name, path in job.fmus.items()}
+    return Task(**vars(request.open_point(opened)), **request.settings, fmus=fmus, folder=RunFolder(folder))
 
 
 def job_result(job: RunJob, work: Callable[[], object]) -> JobResult:

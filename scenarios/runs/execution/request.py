@@ -8,12 +8,11 @@ import copy
 import functools
 import weakref
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, cast
 
-from handover.cosim.stepping.options import MasterOptions
 from handover.cosim.system.system import System
 from handover.fmus.build import cached
 from handover.scenarios.catalog import SCENARIOS
@@ -33,37 +32,19 @@ from handover.scenarios.runs.execution.selection import (
 from handover.scenarios.runs.execution.ssp_run import checked_stop, is_ssp, open_experiment, source_of
 from handover.scenarios.runs.execution.unit_values import split_parameters
 from handover.scenarios.runs.results.run_folder import RunFolder, dated_folder
-from handover.scenarios.runs.results.task import InputSources, Task
+from handover.scenarios.runs.results.task import RunSettings, Subject, Task
 
 RUNS = Path("runs")
 """Where runs' folders are if nothing names one."""
 
 
-@dataclass(frozen=True)
-class OpenedSubject:
-    """What is to be run: the scenario, its parameters, and what the run's folder keeps to find it again.
-
-    Attributes:
-        experiment, parameters: the scenario, or what runs a file or a system as one.
-        unit_values: values of units' parameters, as texts by `UNIT.NAME`.
-        source, stop: as of `Task`.
-    """
-
-    experiment: Experiment[Any]
-    parameters: Any = NoParameters()
-    unit_values: Mapping[str, str] = field(default_factory=dict[str, str])
-    source: Mapping[str, Any] = field(default_factory=dict[str, Any])
-    stop: Fraction | None = None
-
-
 @dataclass(frozen=True, kw_only=True)
-class RunRequest:
+class RunRequest(RunSettings):
     """What one run is asked to be.
 
     Attributes:
         subject: name of a scenario, path of an SSP or FMU, a system that was wired in Python, or a scenario's class.
         parameters: texts `NAME=VALUE`.
-        seed: of all random numbers.
         units: texts `NAME=FILE` or `NAME=MODULE:CLASS`, of what takes the place of a scenario's units.
         out: the run's folder, new or empty; None for one of its own in `runs/`.
         start: when the run starts, s, of a system, an SSP or an FMU; they may have a time of their own.
@@ -71,13 +52,10 @@ class RunRequest:
         endless: whether a system, an SSP or an FMU has no stop time, since a program steps it.
         step: of all units of an SSP or FMU, s.
         inputs: a file of inputs over time, of an FMU by itself.
-        sources: who gives values to inputs from outside, see `played_back`.
-        formats, every, options, presented, pushed, recorded: as of `Task`.
     """
 
     subject: str | System | type[Experiment[Any]]
     parameters: Sequence[str] = ()
-    seed: int = 0
     units: Sequence[str] = ()
     out: Path | None = None
     start: Fraction | None = None
@@ -85,13 +63,6 @@ class RunRequest:
     endless: bool = False
     step: Fraction | None = None
     inputs: Path | None = None
-    sources: InputSources | None = None
-    formats: Sequence[str] = ()
-    every: Fraction | None = None
-    options: MasterOptions = field(default_factory=MasterOptions)
-    presented: bool = True
-    pushed: bool = False
-    recorded: Sequence[str] = ()
 
     def task(self, opened: contextlib.ExitStack) -> Task:
         """Return the task, all parts of which are checked and whose folder is its own; `opened` closes what that opens.
@@ -103,23 +74,7 @@ class RunRequest:
         asked = self.open(opened)
         stem = Path(asked.experiment.name).stem
         folder = RunFolder(self.out or opened.enter_context(dated_folder(RUNS, stem)))
-        return Task(
-            experiment=asked.experiment,
-            parameters=asked.parameters,
-            seed=self.seed,
-            fmus=self.fmus(asked.experiment),
-            unit_values=asked.unit_values,
-            folder=folder.claim(opened),
-            formats=tuple(dict.fromkeys(self.formats)),
-            every=self.every,
-            source=asked.source,
-            options=self.options,
-            presented=self.presented,
-            pushed=self.pushed,
-            recorded=self.recorded,
-            stop=asked.stop,
-            inputs=self.sources,
-        )
+        return Task(**vars(asked), **self.settings, fmus=self.fmus(asked.experiment), folder=folder.claim(opened))
 
     def check_options(self) -> None:
         """Reject what cannot be run at all, and options that are for another kind of run than this one.
@@ -152,7 +107,7 @@ class RunRequest:
         elif self.stop is not None and self.stop <= 0:
             raise UsageError(f"--stop: {float(self.stop):g} s is not after the scenario's begin at 0 s")
 
-    def open(self, opened: contextlib.ExitStack) -> OpenedSubject:
+    def open(self, opened: contextlib.ExitStack) -> Subject:
         """Return what is to be run; `opened` closes what that opens.
 
         Raises:
@@ -163,7 +118,7 @@ class RunRequest:
         check_effects(type(asked.experiment), asked.parameters)
         return asked
 
-    def open_point(self, opened: contextlib.ExitStack) -> OpenedSubject:
+    def open_point(self, opened: contextlib.ExitStack) -> Subject:
         """Return the same for a point of a campaign, at others of which its parameters may have effects.
 
         Raises:
@@ -176,7 +131,7 @@ class RunRequest:
             system.start = system.start if self.start is None else self.start
             asked = system.start + ENDLESS if self.endless else self.stop
             stop = checked_stop(Path("system"), system.start, asked, None)
-            return OpenedSubject(system_experiment("system", "a system wired in Python", system, stop))
+            return Subject(system_experiment("system", "a system wired in Python", system, stop))
         if isinstance(self.subject, type):
             return self._of_class(self.subject)
         path = self.path
@@ -184,14 +139,14 @@ class RunRequest:
             of_ssp = open_experiment(
                 path, self.stop, self.step, opened, self.parameters, self.start, endless=self.endless
             )
-            return OpenedSubject(of_ssp, source=source_of(path, *_times_of(of_ssp), self.step, self.parameters))
+            return Subject(of_ssp, source=source_of(path, *_times_of(of_ssp), self.step, self.parameters))
         if is_fmu(self.subject):
             alone = FmuRun(path, self.parameters, self.inputs, self.start, self.stop, self.step, self.endless)
             of_fmu = alone.open()
-            return OpenedSubject(of_fmu, source=alone.as_source(*_times_of(of_fmu)))
+            return Subject(of_fmu, source=alone.as_source(*_times_of(of_fmu)))
         scenario = find_scenario(self.subject)
         values = split_parameters(scenario, self.parameters)
-        return OpenedSubject(scenario(), *values, own_source(self.subject), self.stop)
+        return Subject(scenario(), *values, own_source(self.subject), self.stop)
 
     def fmus(self, experiment: Experiment[Any]) -> dict[str, Path]:
         """Return the FMU of each unit of the scenario; those of the catalog are built where they are not yet.
@@ -202,7 +157,7 @@ class RunRequest:
         kind = type(experiment)
         return select_fmus(kind, replacements(kind, self.units), lambda unit: cached(unit, 3))
 
-    def system(self, asked: OpenedSubject, seed: int, fmus: Mapping[str, Path]) -> System:
+    def system(self, asked: Subject, seed: int, fmus: Mapping[str, Path]) -> System:
         """Return the system that is to be run, checked.
 
         Raises:
@@ -213,11 +168,11 @@ class RunRequest:
         system.check()
         return system
 
-    def _of_class(self, scenario: type[Experiment[Any]]) -> OpenedSubject:
+    def _of_class(self, scenario: type[Experiment[Any]]) -> Subject:
         """Return a scenario by its class; that of a program or a notebook has no path by which it is found again."""
         values = split_parameters(scenario, self.parameters)
         path = path_of_class(scenario)
-        return OpenedSubject(scenario(), *values, {} if path is None else own_source(path), self.stop)
+        return Subject(scenario(), *values, {} if path is None else own_source(path), self.stop)
 
     @property
     def path(self) -> Path:

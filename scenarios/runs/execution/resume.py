@@ -119,7 +119,7 @@ class InterruptedRun:
                 recorded=tuple(description.get("recorded", ())),
                 options=self.resumption.options,
                 stop=None if stop is None else Fraction(stop),
-                inputs=resumed_inputs(self.folder, description.get("inputs"), pushes, hand),
+                sources=resumed_inputs(self.folder, description.get("inputs"), pushes, hand),
                 pushed=not inputs_of_pushes(pushes).keys().isdisjoint(recorded_input_names(self.folder)),
             )
             given = parameters_of(type(experiment), description["parameters"])

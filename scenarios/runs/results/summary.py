@@ -56,8 +56,8 @@ def configuration(task: Task) -> dict[str, Any]:
         given["stop"] = str(task.stop)
     if task.recorded:
         given["recorded"] = list(task.recorded)
-    if task.inputs is not None:
-        given["inputs"] = dict(task.inputs.origin)
+    if task.sources is not None:
+        given["inputs"] = dict(task.sources.origin)
     return dict[str, Any](
         **given,
         scenario=task.experiment.name,
@@ -209,8 +209,8 @@ def _given_rows(task: Task) -> list[list[str]]:
     given: Sequence[str] = task.source.get("parameters", ())
     rows = [[*(part.strip() for part in text.split("=", 1)), "given start value"] for text in given]
     rows += [[name, text, "given value of the unit's parameter"] for name, text in task.unit_values.items()]
-    if task.inputs is not None:
-        text = ", ".join(f"{name} {value}" for name, value in task.inputs.origin.items())
+    if task.sources is not None:
+        text = ", ".join(f"{name} {value}" for name, value in task.sources.origin.items())
         rows.append(["inputs", text, "where the inputs from outside came from"])
     return rows if task.stop is None else [*rows, ["stop", f"{float(task.stop):g} s", "given stop time of the run"]]
 

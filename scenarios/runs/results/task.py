@@ -1,14 +1,14 @@
 """The specification of a run: scenario, parameters, FMUs, options of the master, output folder."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 from handover.cosim.stepping.options import MasterOptions
 from handover.cosim.system.time_series import ExternalSource
-from handover.scenarios.experiment.experiment import Experiment
+from handover.scenarios.experiment.experiment import Experiment, NoParameters
 from handover.scenarios.runs.results.run_folder import RunFolder
 
 
@@ -30,40 +30,64 @@ class InputSources:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Task:
-    """A run before it begins.
+class RunSettings:
+    """How a run is made, whatever it is of.
 
     Attributes:
-        experiment, parameters, seed: the scenario, and what it is run with.
-        fmus: the FMU of each unit.
-        unit_values: values of units' parameters, as texts by `UNIT.NAME`.
-        folder: where its results are written.
+        seed: of all random numbers of a scenario.
         formats: further file formats of the record, see `RECORD_FORMATS`.
         every: simulated seconds between checkpoints; None for no checkpoints.
-        source: what `resume` needs to find the experiment again, if the catalog does not have it.
         options: of the master, which runs the units.
         presented: whether figures and a report are made at the end.
-        stop: when the run ends, s, at the first communication point at or after it; None: as the scenario says.
-        inputs: who gives values to inputs from outside; None: as the scenario says, by itself nobody.
+        sources: who gives values to inputs from outside; None: as the scenario says, by itself nobody.
         pushed: whether bodies that can be pushed may be: then forces and points are inputs from outside.
         recorded: patterns `UNIT.NAME` of local variables and parameters that are recorded, see `record_variables`.
     """
 
-    experiment: Experiment[Any]
-    parameters: Any
-    seed: int
-    fmus: Mapping[str, Path]
-    folder: RunFolder
+    seed: int = 0
     formats: Sequence[str] = ()
-    unit_values: Mapping[str, str] = field(default_factory=dict[str, str])
     every: Fraction | None = None
-    source: Mapping[str, Any] = field(default_factory=dict[str, Any])
     options: MasterOptions = field(default_factory=MasterOptions)
     presented: bool = True
-    stop: Fraction | None = None
-    inputs: InputSources | None = None
+    sources: InputSources | None = None
     pushed: bool = False
     recorded: Sequence[str] = ()
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """These values by name."""
+        return {f.name: getattr(self, f.name) for f in fields(RunSettings)}
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What is run: a scenario with its parameters, or what runs a file or a system as one.
+
+    Attributes:
+        experiment, parameters: the scenario.
+        unit_values: values of units' parameters, as texts by `UNIT.NAME`.
+        source: what `resume` needs to find the experiment again, if the catalog does not have it.
+        stop: when the run ends, s, at the first communication point at or after it; None: as the scenario says.
+    """
+
+    experiment: Experiment[Any]
+    parameters: Any = NoParameters()
+    unit_values: Mapping[str, str] = field(default_factory=dict[str, str])
+    source: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    stop: Fraction | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Task(Subject, RunSettings):
+    """A run before it begins.
+
+    Attributes:
+        fmus: the FMU of each unit.
+        folder: where its results are written.
+    """
+
+    fmus: Mapping[str, Path]
+    folder: RunFolder
 
     @property
     def stop_time(self) -> Fraction:

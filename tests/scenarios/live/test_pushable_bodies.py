@@ -32,7 +32,7 @@ def pushed_run(name: str, out: Path, forces: Mapping[str, Sequence[float] | Floa
     series = {end: TimeSeries([0.0], [list(value)], linear=False) for end, value in forces.items()}
     task: Any = task_of(SCENARIOS[name], out, *given)
     inputs = InputSources(series, {"from": "program"})
-    run_task(replace(task, pushed=True, stop=Fraction(str(_STOP)), inputs=inputs), tell_nobody, Interruption())
+    run_task(replace(task, pushed=True, stop=Fraction(str(_STOP)), sources=inputs), tell_nobody, Interruption())
     return Record(out / "signals.parquet")
 
 

@@ -74,7 +74,7 @@ def led_by_script(wanted: Path, out: Path) -> None:
     inputs = SharedInputs.create(out.with_suffix(".inputs"), sizes, ["person.age"])
     script = Scripted(inputs, Record(wanted / "signals.parquet"))
     inputs = InputSources(script.sources(), {"from": "program", "what": "a script"})
-    task = replace(task_of(RobotToHuman, out, "hand=outside"), inputs=inputs, stop=Fraction(1, 2))
+    task = replace(task_of(RobotToHuman, out, "hand=outside"), sources=inputs, stop=Fraction(1, 2))
     run_task(task, tell_nobody, Interruption())
 
 
@@ -178,7 +178,7 @@ def held_until(released: float, force: float) -> dict[str, ExternalSource]:
 def test_a_run_that_could_be_pushed_is_resumed_as_it_was_recorded_and_is_then_let_go(tmp_path: Path, is_page: bool):
     task = task_of(FlyerImpedance, tmp_path / "whole", "begin=30")
     inputs = InputSources(held_until(0.6, 4.0), {"from": "page"}) if is_page else None
-    task = replace(task, every=Fraction(1, 5), stop=Fraction(4, 5), pushed=True, inputs=inputs)
+    task = replace(task, every=Fraction(1, 5), stop=Fraction(4, 5), pushed=True, sources=inputs)
     at = {"held": 0.45, "released": 0.65}  # when the run is killed: as it is, its folder is copied
 
     def snapshot(t: float, _stop: float) -> None:
@@ -210,7 +210,7 @@ def test_a_hand_whose_page_is_gone_stays_and_its_sample_grows_old(tmp_path: Path
     sources: dict[str, ExternalSource] = {name: wanted.series(goal) for name, goal in GOALS.items()}
     sources["person.age"] = TimeSeries([0.0], [[0.02]], linear=False)
     inputs = InputSources(sources, {"from": "page"})
-    task = replace(task_of(RobotToHuman, tmp_path / "led", "hand=outside"), inputs=inputs, stop=Fraction(1, 2))
+    task = replace(task_of(RobotToHuman, tmp_path / "led", "hand=outside"), sources=inputs, stop=Fraction(1, 2))
     run_task(task, tell_nobody, Interruption())
     led = RobotToHuman().led_hand(task.parameters)
     resumed = resumed_inputs(task.folder, {"from": "page"}, (), led)
