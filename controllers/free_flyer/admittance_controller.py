@@ -1,4 +1,7 @@
-"""Admittance control of a free-flyer's gripper, without a force sensor. [Fernandes2020] secs. 2.2.4 and 6.3."""
+"""Admittance control of a free-flyer's gripper, without a force sensor. [Fernandes2020] secs. 2.2.4 and 6.3.
+
+A `VirtualBody` on a spring and a damper is displaced by the wrench that is felt; the controller follows it.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -7,12 +10,11 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from handover.controllers.free_flyer import impedance_controller, ports
-from handover.controllers.free_flyer.body import InvalidControllerParameters, stability_faults
+from handover.controllers.free_flyer.body import FlyerBody, InvalidControllerParameters, stability_faults
 from handover.controllers.free_flyer.flyer_controller import GripperController, LimitParams
-from handover.controllers.free_flyer.gains import PidGains
+from handover.controllers.free_flyer.gains import ImpedanceGains, PidGains
 from handover.controllers.free_flyer.ports import Behaviour, Inputs, unit_quaternion
-from handover.controllers.free_flyer.sampled_loop import LinearController, SampledLoop
-from handover.controllers.free_flyer.virtual_body import VirtualBody, admittance_law
+from handover.controllers.free_flyer.sampled_loop import LinearController, SampledLoop, discretised
 from handover.controllers.free_flyer.wrench_observer import ThrustModel, WrenchObserver
 from handover.cosim.blocks.origins import assumed
 from handover.cosim.blocks.plain_rotation import (
@@ -39,6 +41,63 @@ from handover.cosim.blocks.plain_rotation import (
 from handover.cosim.blocks.ports import Floats, Vector3, output, parameter
 from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.units import Newton, NewtonMetre, Number, PerSecond, PerSecond2
+
+
+class VirtualBody:
+    """k_M x'' + k_B x' + k_D x = F, the admittance of second order of eq. (2.17), sampled exactly with F held.
+
+    x is the displacement from the goal: position, and rotation vector, whose rate is taken for the angular velocity, as
+    it is where the body turns about one axis. All in the goal's axes, as (6,) or (6, n).
+
+    Args:
+        body: whose mass matrix k_M is a multiple of; the virtual one has its centre of mass in G.
+        gains: stiffness k_D and damping k_B.
+        ratio: virtual over real mass and inertia.
+        period: for which F is held, s.
+    """
+
+    def __init__(self, body: FlyerBody, gains: ImpedanceGains, ratio: float, period: float) -> None:
+        O, I = np.zeros((6, 6)), np.eye(6)
+        inverse: Floats = np.linalg.inv(ratio * body.mass_matrix()).astype(np.float64)
+        A = np.block([[O, I], [-inverse @ gains.stiffness(), -inverse @ gains.damping()]])
+        self._A, self._B = discretised(A, np.vstack([O, inverse]), period)
+
+    def moved(self, state: Floats, wrench: Floats) -> Floats:
+        """Return displacement and twist, 12 rows, a period later."""
+        return self._A @ state + self._B @ wrench
+
+
+def admittance_law(
+    body: FlyerBody,
+    virtual: VirtualBody,
+    observer: WrenchObserver,
+    thrust: ThrustModel,
+    position: PidGains,
+    attitude: PidGains,
+    period: float,
+) -> LinearController:
+    """Return the law of `AdmittanceController` near the goal: commanded wrench on B from displacement and twist of G.
+
+    Its state: the observer's memory (6), displacement and twist of the virtual body (12), thrust (6) and the commands
+    that have not yet arrived (6 each). Each row block is followed as a linear function of state and measurement.
+    """
+    M, J = body.mass_matrix(), body.jacobian()
+    base, to_gripper = np.linalg.inv(J), np.transpose(np.linalg.inv(J))
+    P, D = (np.diag(np.repeat([getattr(position, k), getattr(attitude, k)], 3)) for k in ("k_P", "k_D"))
+    sizes = [6, 12, 6] + [6] * thrust.remembered
+    n = sum(sizes)
+    memory, z, y, *rest = np.split(np.eye(n + 12), np.cumsum([*sizes, 6]))
+    past, x_G, v_G = rest[:-2], rest[-2], rest[-1]
+    momentum = M @ base @ v_G
+    w = observer.estimate(memory, momentum)
+    z_next = virtual.moved(z, to_gripper @ w)
+    a = (z_next[6:] - z[6:]) / period
+    u = M @ (base @ a + P @ base @ (z[:6] - x_G) + D @ base @ (z[6:] - v_G)) - w
+    y_next, mean = thrust.over_period(y, [u, *past])
+    waiting = [u, *past][: thrust.remembered]
+    following = np.vstack([observer.following(memory, momentum, mean), z_next, y_next, *waiting])
+    return LinearController(A=following[:, :n], B=following[:, n:], C=-u[:, :n], D=-u[:, n:])
+
 
 _INNER_LOOP = assumed(
     "tracks a step of the virtual body's force in half a second, and leaves two thirds of the weakest thrust to it"

@@ -31,7 +31,7 @@ from handover.cosim.fmu.file import fmpy_edge
 from handover.cosim.fmu.file.description import describe_fmu
 from handover.cosim.master.master import Master
 from handover.cosim.ssp.ssp_file import SspFile
-from handover.scenarios.runs.results.system_facts import peak_memory
+from handover.scenarios.runs.results.summary import peak_memory
 
 path, times = Path(sys.argv[1]), [time.process_time()]
 def lap():

@@ -16,7 +16,7 @@ class FmuClock:
     """A clock of an FMU.
 
     `variability` is the standard's `intervalVariability`. A time-based clock ticks every `interval` seconds, first at
-    `shift`; where `interval` is None it is read from the unit, see `handover.cosim.fmu.clock_calls`.
+    `shift`; where `interval` is None it is read from the unit, see `handover.cosim.fmu.event_instance`.
     """
 
     name: str

@@ -1,4 +1,7 @@
-"""A person who takes an object from a free-flying robot, gives it one, or only pushes it."""
+"""A person who takes an object from a free-flying robot, gives it one, or only pushes it.
+
+The effort of the arm that pulls or pushes follows from the speed that it gets to.
+"""
 
 import enum
 
@@ -23,10 +26,55 @@ from handover.cosim.blocks.plain_rotation import (
     vector,
 )
 from handover.cosim.blocks.state import pack_state, unpack_state
-from handover.plants.free_flyer.hand.effort import Effort, force_at_rest
 from handover.plants.free_flyer.hand.parameters import ContactParams, Motion, StartHolder
 from handover.plants.free_flyer.hand.sight import CLOSING, ROUNDING, Perception, Sight
 from handover.plants.hand_motion import minimum_jerk
+
+_LENGTHENING = 1.3
+"""Greatest force of an arm that is drawn back against its effort, over its force at rest (assumed)."""
+
+
+class Effort:
+    """Motion of the hand along an axis by an arm of mass m that exerts a force F against a load f.
+
+        m dv/dt = F - f,  F = F_a g(v / v_0),  g(x) = min(1 - x, 1.3),
+
+    F_a the force at rest, v_0 the speed of a hand that nothing resists: a hand that comes free is no faster than v_0.
+    A single muscle's curve sags below this line (Hill), but that of a whole arm, of many muscles and joints, is close
+    to straight. The rule is linearly implicit, hence stable at any step. At `length` the person stops the hand; there
+    the arm's spring holds.
+
+    Args:
+        mass: m, in kg.
+
+    Attributes:
+        speed: of the hand along the axis, m/s.
+        travelled: way along the axis, m.
+    """
+
+    def __init__(self, mass: float) -> None:
+        self._mass = mass
+        self.speed, self.travelled = 0.0, 0.0
+
+    def begin(self) -> None:
+        """Start from rest."""
+        self.speed, self.travelled = 0.0, 0.0
+
+    def advance(self, dt: float, force: float, free_speed: float, length: float, load: float) -> None:
+        """Move for dt by a force at rest F_a against a load, both in N along the axis."""
+        share, slope = 1.0 - self.speed / free_speed, force / free_speed
+        if share > _LENGTHENING:
+            share, slope = _LENGTHENING, 0.0
+        self.speed += dt * (force * share - load) / (self._mass + dt * slope)
+        self.travelled += dt * self.speed
+        if self.travelled >= length:
+            self.speed, self.travelled = 0.0, length
+
+
+def force_at_rest(effort: float, clock: float, rise: float, end: float, fall: float) -> float:
+    """Return F_a, N: it rises to the effort in the time `rise`, and from `end` falls to nothing in the time `fall`."""
+    return effort * minimum_jerk(clock / rise) * (1.0 - minimum_jerk((clock - end) / fall))
+
 
 _PEAK = 1.875
 """Highest speed of a minimum-jerk course over its mean speed: 15/8, of 30 s^2 - 60 s^3 + 30 s^4 at s = 1/2 (Flash and

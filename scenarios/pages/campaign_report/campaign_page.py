@@ -1,6 +1,7 @@
-"""Writes the page of a campaign from its folder: the header, and the sections that it has."""
+"""Writes the page of a campaign from its folder: header, claims, settings, and the sections of other modules."""
 
-from collections.abc import Sequence
+import base64
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,13 +12,12 @@ from handover.cosim.exceptions import counted, one_line
 from handover.cosim.files import scratch_folder
 from handover.cosim.typed_data import read_typed
 from handover.scenarios.experiment.display_unit import display_unit
-from handover.scenarios.pages.campaign_report.claims_section import claims_section, comparison_section, verdict_html
+from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.pages.campaign_report.figures import draw_campaign
 from handover.scenarios.pages.campaign_report.pairs_section import pairs_section
 from handover.scenarios.pages.campaign_report.point_layout import layout_of
 from handover.scenarios.pages.campaign_report.points import points_section, success_section
 from handover.scenarios.pages.campaign_report.runs import failures_section, runs_section
-from handover.scenarios.pages.campaign_report.settings import figures_section, setting_section
 from handover.scenarios.pages.campaign_report.spread_section import spread_section
 from handover.scenarios.published.catalog import EXPERIMENTS
 from handover.scenarios.published.published_experiment import (
@@ -25,14 +25,139 @@ from handover.scenarios.published.published_experiment import (
     ComparisonTable,
     PaperResults,
     PublishedExperiment,
+    Verdict,
     draw_figures,
     verdict_counts,
 )
 from handover.scenarios.runs.campaign.folder import CampaignFolder
 from handover.scenarios.runs.campaign.results import CampaignResults, read_results
+from handover.scenarios.runs.execution.request import is_file
+from handover.scenarios.runs.reporting.html import rows_table
 from handover.scenarios.runs.reporting.page import Section, write_page
 from handover.scenarios.runs.results.run_folder import InvalidRunFolder, disk_errors_reported
+from handover.scenarios.runs.results.tables import format_value, options_in_words
 from handover.scenarios.runs.results.tolerated_faults import ToleratedFaults
+
+
+def setting_section(results: CampaignResults) -> Section:
+    """Return tables of what is set for all runs; other parameters have the scenario's defaults."""
+    metadata = results.metadata
+    options = options_in_words(metadata.get("master", {}))
+    parts = [
+        _part("Fixed parameters", {n: _value(results, n, v) for n, v in metadata["fixed"].items()}),
+        _part("Master", {n: format_value(v) for n, v in options.items() if v is not None}),
+        _part("Versions", {n: str(v) for n, v in metadata.get("versions", {}).items()}),
+        _fmus(metadata.get("units", {})),
+    ]
+    others = "Parameters that are neither varied nor fixed have"
+    defaults = f"{others} the scenario's defaults; each run's run.json has all."
+    if is_file(results.scenario):
+        defaults = f"{others} the values that the file gives."
+    html = Markup("<div class='columns'>{}</div><p class='soft'>{}</p>").format(Markup().join(parts), defaults)
+    return Section(anchor="setting", title="Setting", html=html)
+
+
+def _part(title: str, rows: Mapping[str, str]) -> Markup:
+    if not rows:
+        return Markup()
+    return Markup("<div><h3>{}</h3>{}</div>").format(
+        title, rows_table(("name", "value"), list(rows.items()), numbers=(1,))
+    )
+
+
+def _fmus(units: Mapping[str, Mapping[str, str]]) -> Markup:
+    if not units:
+        return Markup()
+    rows = [
+        (
+            Markup("<span class='name'>{}</span>").format(name),
+            Markup("<span class='name'>{}</span>").format(u["fmu"]),
+            Markup("<code>{}</code>").format(u["sha256"][:12]),
+        )
+        for name, u in units.items()
+    ]
+    return Markup("<div class='across'><h3>FMUs</h3>{}</div>").format(rows_table(("unit", "file", "sha256"), rows))
+
+
+def _value(results: CampaignResults, name: str, text: str) -> str:
+    if results.is_number(name):
+        return display_unit(results.unit(name), float(text)).text(float(text))
+    unit = results.unit(name)
+    return text if unit == "1" else f"{text} {unit}"
+
+
+def figures_section(figures: Sequence[Figure], folder: Path) -> Section | None:
+    """Return figures with their captions, None if there are none; `folder` has them as PNG."""
+    if not figures:
+        return None
+    html = Markup("\n").join(_html(f, folder / f"{f.name}.png") for f in figures)
+    return Section(anchor="figures", title="Figures", html=html)
+
+
+def _html(figure: Figure, file: Path) -> Markup:
+    data = base64.b64encode(file.read_bytes()).decode()
+    return Markup(
+        "<figure><div class='scroll'><img class='paper' alt='{}' src='data:image/png;base64,{}'></div>"
+        "<figcaption>{}</figcaption></figure>"
+    ).format(figure.name.replace("_", " "), data, figure.caption)
+
+
+_HEADER = ("claim", "published", "ours", "95 % interval", "verdict")
+_HEADER_BEYOND = tuple(name for name in _HEADER if name != "published")
+_COLOURS = {Verdict.REPRODUCED: "good", Verdict.NOT_REPRODUCED: "bad", Verdict.NOT_COMPARABLE: "soft"}
+
+
+def claims_section(claims: Sequence[Claim]) -> Section | None:
+    """Return the table of claims with their verdicts, this project's own below; None if there are none."""
+    parts: list[Markup] = []
+    for beyond, title, header in ((False, "", _HEADER), (True, "Beyond the paper", _HEADER_BEYOND)):
+        rows = [_rows(c, header) for c in claims if c.beyond is beyond]
+        if rows:
+            heads = Markup().join(Markup("<th scope='col'>{}</th>").format(h) for h in header)
+            heading = Markup("<h3>{}</h3>").format(title) if title else Markup()
+            table = Markup("<table class='cards claims'><thead><tr>{}</tr></thead><tbody>\n{}\n</tbody></table>")
+            parts.append(heading + table.format(heads, Markup("\n").join(rows)))
+    return Section(anchor="claims", title="Claims", html=Markup("\n").join(parts)) if parts else None
+
+
+def verdict_html(verdict: Verdict, words: str) -> Markup:
+    """Return the words of a verdict in its colour."""
+    return Markup("<b class='{}'>{}</b>").format(_COLOURS[verdict], words)
+
+
+def _rows(claim: Claim, header: Sequence[str]) -> Markup:
+    where = Markup("<br><span class='soft'>{}</span>").format(claim.where) if claim.where else Markup()
+    verdict = verdict_html(claim.verdict, claim.verdict_text)
+    cells = {
+        "claim": Markup("{}{}").format(claim.claim, where),
+        "published": claim.published,
+        "ours": claim.measured,
+        "95 % interval": claim.interval_text,
+        "verdict": verdict,
+    }
+    text = Markup().join(
+        Markup("<td data-label='{}'{}>{}</td>").format(
+            name, Markup() if cells[name] else Markup(" class='empty'"), cells[name]
+        )
+        for name in header
+    )
+    why = Markup("<tr class='why'><td colspan='{}'>{}</td></tr>").format(len(header), claim.reason)
+    return Markup("<tr>{}</tr>").format(text) + why
+
+
+def comparison_section(tables: Sequence[ComparisonTable]) -> Section | None:
+    """Return published values beside ours; None if there are none."""
+    note = Markup("<p class='soft'>{}</p>")
+    parts = [
+        Markup("<h3>{}</h3>").format(t.title)
+        + rows_table(t.header, t.rows)
+        + (note.format(t.note) if t.note else Markup())
+        for t in tables
+    ]
+    if not parts:
+        return None
+    return Section(anchor="comparison", title="Published and ours", html=Markup("\n").join(parts))
+
 
 _MAX_VALUES = 10
 

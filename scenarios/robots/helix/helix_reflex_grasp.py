@@ -1,6 +1,7 @@
 """The Helix's cameras bring its gripper near a ball, and infrared sensors in its fingers centre it there.
 
-[Vervloet2025] for arm, vision and control, [Luberto] for the sensors; neither has the two together.
+[Vervloet2025] for arm, vision and control, [Luberto] for the sensors; neither has the two together. The evaluation adds
+to the handover's where the ball was as the gripper began to close.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,20 +12,73 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
+from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System
-from handover.scenarios.experiment.experiment import Figure, FmuOf
+from handover.scenarios.experiment.experiment import Figure, FmuOf, Metric
 from handover.scenarios.experiment.exposed import with_exposed
 from handover.scenarios.experiment.paper import PublishedValue
 from handover.scenarios.experiment.pictures import CameraPicture
 from handover.scenarios.experiment.places import Place
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimeFigure
+from handover.scenarios.robots.helix.evaluation import HandoverEvaluator, beside_and_along
 from handover.scenarios.robots.helix.helix_handover import HelixHandover
 from handover.scenarios.robots.helix.parameters import Parameters
 from handover.scenarios.robots.helix.places import REFLEX_PLACES
-from handover.scenarios.robots.helix.reflex_grasp_evaluation import ReflexGraspEvaluator
 from handover.scenarios.robots.helix.reflex_grasp_parameters import Offer, ReflexGraspParameters
+
+
+class ReflexGraspEvaluator(HandoverEvaluator):
+    """Follows the handover as its base does, and what the controller believes of the ball's place in the gripper.
+
+    Args:
+        parameters: of the handover.
+        pictures: those that were kept, where a record is evaluated; None: they are taken.
+    """
+
+    def __init__(self, parameters: Parameters, pictures: Sequence[CameraPicture] | None = None) -> None:
+        super().__init__(parameters, pictures)
+        self._p_GO_closing: Floats | None = None  # when the gripper began to close, the last time
+        self._believed: Floats | None = None  # likewise, by the controller
+
+    def __call__(self, t: float, signals: Signals) -> None:
+        """Follow the handover, and note where the ball is as the gripper begins to close."""
+        before = self._grasp_began
+        super().__call__(t, signals)
+        if self._grasp_began != before:
+            self._p_GO_closing = self._p_GO
+            self._believed = np.array(signals["reflex.p_GO_est"]) if "reflex.p_GO_est" in signals else None
+
+    def _metrics(self) -> dict[str, Metric]:
+        metrics = super()._metrics()
+        if self._p_GO_closing is None:
+            return metrics
+        lateral, axial = beside_and_along(self._p_GO_closing)
+        metrics["closing_offset_lateral"] = Metric(
+            lateral, "m", "ball beside the gripper's axis when the gripper begins to close, ground truth"
+        )
+        metrics["closing_offset_axial"] = Metric(
+            axial, "m", "ball along the gripper's axis, towards its tip, when the gripper begins to close, ground truth"
+        )
+        if self._believed is not None:
+            metrics["felt_error"] = Metric(
+                float(np.linalg.norm(self._believed - self._p_GO_closing)),
+                "m",
+                "controller's error of the ball's place in the gripper when it begins to close",
+            )
+        return metrics
+
+    def _reason(self, success: bool) -> str:
+        reason = super()._reason(success)
+        if success or self._p_GO_closing is None or self._believed is None:
+            return reason
+        beside, believed = beside_and_along(self._p_GO_closing)[0], beside_and_along(self._believed)[0]
+        return (
+            f"{reason}; as the gripper began to close the ball was {beside:.3f} m beside its axis, "
+            f"{believed:.3f} m as the controller had it"
+        )
 
 
 class HelixReflexGrasp(HelixHandover):

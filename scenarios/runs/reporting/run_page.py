@@ -1,34 +1,192 @@
 """Writes the report page of a run, from what its folder keeps.
 
-`write_run_page` puts the sections together. Header, tables (metrics, parameters, master, files) and the comparison with
-published values are made here; graph, plots, pictures and replay in their own modules.
+`write_run_page` puts the sections together. Header, tables (metrics, parameters, master, files), the comparison with
+published values, CPU times and camera pictures are made here; graph, plots and replay in their own modules.
 """
 
+import base64
+import math
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
+import cv2
+import plotly.graph_objects as go
 from markupsafe import Markup
 
 from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.paper import PublishedValue
 from handover.scenarios.experiment.parameters import InvalidParameter, parameters_of
+from handover.scenarios.experiment.pictures import CameraPicture, Mark
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimePlot
-from handover.scenarios.runs.reporting.cpu_section import cpu_section
 from handover.scenarios.runs.reporting.graph import graph_section
-from handover.scenarios.runs.reporting.html import rows_table
+from handover.scenarios.runs.reporting.html import plot_html, rows_table
 from handover.scenarios.runs.reporting.page import Section, template, write_page
-from handover.scenarios.runs.reporting.pictures_section import pictures_section
 from handover.scenarios.runs.reporting.replay_section import replay_section
 from handover.scenarios.runs.reporting.time_plots import explorer_section, time_plots_section
 from handover.scenarios.runs.results.lacking_record import LackingRecord
+from handover.scenarios.runs.results.pictures import read_picture_files
 from handover.scenarios.runs.results.run_facts import RunFacts, record_of
 from handover.scenarios.runs.results.run_folder import InvalidRunFolder, RunFolder
 from handover.scenarios.runs.results.tables import format_conversion, format_metric, master_rows, warning_lines
 from handover.scenarios.runs.results.tolerated_faults import ToleratedFaults, drawing
+
+_MAX_BARS = 24
+"""Units that have a bar of their own; of more, the cheapest share one."""
+
+_REST = "master, recording and other"
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Bar:
+    label: str
+    seconds: float
+    colour: str = "var(--c0)"
+
+
+def cpu_section(summary: Mapping[str, Any]) -> Section | None:
+    """Return CPU seconds by unit, and the master's beside them; None where they are unknown.
+
+    Args:
+        summary: what is in `summary.json`.
+    """
+    units = [u for u in summary.get("units", ()) if u.get("cpu_seconds") is not None]
+    of_process = summary.get("cpu_seconds")
+    if not units or of_process is None:
+        return None
+    rest = max(0.0, of_process - sum(u["cpu_seconds"] for u in units))
+    total = sum(u["cpu_seconds"] for u in units) + rest
+    if total <= 0.0:
+        return None
+    bars = [*_bars(units), _Bar(label=_REST, seconds=rest, colour="var(--soft)")]
+    html = template("cpu.html").render(
+        plot=_plot(bars, total),
+        rows=[(u, _per_step(u), _share(u["cpu_seconds"], total)) for u in units],
+        rest=(_REST, rest, _share(rest, total)),
+        total=total,
+        simulated=summary["simulated_seconds"],
+    )
+    return Section(anchor="cpu", title="CPU time", html=Markup(html))
+
+
+def _bars(units: Sequence[Mapping[str, Any]]) -> list[_Bar]:
+    """Return bars of the units, the most expensive first."""
+    ordered = sorted(units, key=lambda u: -u["cpu_seconds"])
+    bars = [_Bar(label=u["name"], seconds=u["cpu_seconds"]) for u in ordered[:_MAX_BARS]]
+    if others := ordered[_MAX_BARS:]:
+        bars.append(_Bar(label=f"{len(others)} other units", seconds=sum(u["cpu_seconds"] for u in others)))
+    return bars
+
+
+def _plot(bars: Sequence[_Bar], total: float) -> Markup:
+    seconds = [b.seconds for b in bars]
+    texts = [f"{s:.3g} s, {_share(s, total)}" for s in seconds]
+    bar = go.Bar(
+        x=seconds,
+        y=[_in_two_lines(b.label) for b in bars],
+        orientation="h",
+        marker={"color": [b.colour for b in bars]},
+        text=texts,
+        textposition="auto",
+        insidetextanchor="end",
+        insidetextfont={"color": "var(--page)"},
+        textangle=0,
+        hovertemplate="%{y}: %{text}<extra></extra>",
+    )
+    figure = go.Figure(
+        [bar],
+        {
+            "xaxis": {"title": {"text": "CPU time (s)"}, "rangemode": "tozero"},
+            "yaxis": {"autorange": "reversed", "type": "category", "dtick": 1, "fixedrange": True, "showgrid": False},
+            "bargap": 0.3,
+            "showlegend": False,
+        },
+    )
+    return plot_html(figure, height=80 + 32 * len(bars), label="CPU time by unit: " + "; ".join(
+        f"{b.label} {text}" for b, text in zip(bars, texts, strict=True)
+    ))  # fmt: skip
+
+
+def _in_two_lines(label: str) -> str:
+    return label.replace(", ", ",<br>", 1)
+
+
+def _share(seconds: float, total: float) -> str:
+    percent = 100.0 * seconds / total
+    return f"{percent:.0f} %" if percent >= 9.95 else f"{percent:.1f} %"
+
+
+def _per_step(unit: Mapping[str, Any]) -> float | None:
+    """Return the mean CPU time of a step, ms."""
+    return 1000.0 * unit["cpu_seconds"] / unit["steps"] if unit.get("steps") else None
+
+
+_WIDTHS = (960, 800, 640, 480, 360)
+"""Widths to choose from, px: the greatest at which all pictures have room in the page."""
+
+_QUALITY = 80
+_MAX_BYTES = 1_200_000
+"""Size of all pictures in a page together, in base64."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _DisplayedPicture:
+    """A picture in the page: its source, its data in base64, and a caption for screen readers."""
+
+    picture: CameraPicture
+    data: str
+
+    @property
+    def caption(self) -> str:
+        p = self.picture
+        marked = ", ".join(mark.label for mark in p.marks)
+        return f"{p.camera} camera at {p.t:.1f} s, {p.role}" + (f"; marked: {marked}" if marked else "; nothing marked")
+
+
+def pictures_section(folder: RunFolder) -> Section | None:
+    """Return the pictures in a run's folder, those of one moment side by side; None where there are none.
+
+    Raises:
+        InvalidRunFolder: they are damaged.
+    """
+    pictures = read_picture_files(folder.pictures)
+    if not pictures:
+        return None
+    moments: dict[tuple[float, str], list[_DisplayedPicture]] = {}
+    for picture, data in zip(pictures, _inline(pictures), strict=True):
+        moments.setdefault((picture.t, picture.role), []).append(_DisplayedPicture(picture=picture, data=data))
+    marks = {mark.label: mark for picture in pictures for mark in picture.marks}
+    html = template("pictures.html").render(moments=moments, legend=list(marks.values()), place=_mark_style)
+    return Section(anchor="pictures", title="What the cameras saw", html=Markup(html))
+
+
+def _inline(pictures: Sequence[CameraPicture]) -> list[str]:
+    """Return the pictures in base64, at the greatest width at which all have room."""
+    encoded: list[str] = []
+    for width in _WIDTHS:
+        encoded = [base64.b64encode(_scaled_down(p, width)).decode() for p in pictures]
+        if sum(map(len, encoded)) <= _MAX_BYTES:
+            break
+    return encoded
+
+
+def _scaled_down(picture: CameraPicture, width: int) -> bytes:
+    if picture.width <= width:
+        return picture.jpeg
+    height = math.ceil(picture.height * width / picture.width)
+    pixels = cv2.resize(picture.pixels, (width, height), interpolation=cv2.INTER_AREA)
+    return cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1].tobytes()
+
+
+def _mark_style(mark: Mark, picture: CameraPicture) -> str:
+    """Return the CSS that puts a mark at its position in a picture shown at any size."""
+    left, top = 100.0 * (mark.u + 0.5) / picture.width, 100.0 * (mark.v + 0.5) / picture.height
+    wide = 100.0 * 2.0 * mark.radius / picture.width
+    return f"left:{left:.3f}%;top:{top:.3f}%;width:{wide:.3f}%;color:{mark.colour}"
 
 
 @drawing

@@ -1,7 +1,10 @@
 """Serves a study's page, one file with its scripts, style and words inside, one seat at a time, and nothing else.
 
 On loopback, pages of other sites are kept away by the host that is asked for and by the origin of a connection. On
-another address the page is below a token that only its own address holds.
+another address the page is below a token that only its own address holds. A hand tracker connects to
+`ws://HOST:PORT/hand`, with a token below it as the page is, and sends what `hand_messages` says. One tracker at a time
+leads the hand, in sessions whose participant has chosen it; its samples between two runs are passed over. At each run's
+start it is sent the hand's pose.
 """
 
 import contextlib
@@ -18,18 +21,84 @@ from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, Response
 from starlette.routing import Route, WebSocketRoute
-from starlette.websockets import WebSocket
+from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from handover.scenarios.live.connections import HEADERS, POLICY_VIOLATION, is_same_origin
+from handover.scenarios.live.connections import (
+    HEADERS,
+    POLICY_VIOLATION,
+    BinaryMessage,
+    MessageRate,
+    RefusalTimer,
+    accept,
+    is_same_origin,
+    receive_text,
+    refuse,
+    send_json,
+    too_many,
+)
+from handover.scenarios.live.hand_messages import HandSample, InvalidHandMessage, hand_start
 from handover.scenarios.live.page_server import PageServer
 from handover.scenarios.live.webcam import WEBCAM_SCRIPTS, WebcamFiles
 from handover.scenarios.runs.reporting.html import json_html
 from handover.scenarios.runs.reporting.page import asset, plain_page_html, template
 from handover.scenarios.runs.reporting.replay_section import SCENE_SCRIPTS
+from handover.scenarios.study.plan.led_hands import led_hand_of, round_parameters
 from handover.scenarios.study.plan.plan import StudyPlan
+from handover.scenarios.study.session import page_messages
 from handover.scenarios.study.session.page_messages import LONGEST
 from handover.scenarios.study.session.seat import StudySeat
-from handover.scenarios.study.session.tracker import TrackerSeat
+
+
+class TrackerSeat:
+    """Gives the samples of one tracker to the trial of a seat.
+
+    Args:
+        seat: whose page shows it.
+    """
+
+    def __init__(self, seat: StudySeat) -> None:
+        self._seat = seat
+        self._tracker: WebSocket | None = None
+
+    async def connection(self, tracker: WebSocket) -> None:
+        """Serve one tracker until its connection ends."""
+        if not await accept(tracker):
+            return
+        if self._tracker is not None:
+            await refuse(tracker, "another tracker leads the hand; it is free when that one goes")
+            return
+        self._tracker = tracker
+        condition = self._seat.protocol.study.plan.conditions[0]
+        led = led_hand_of(condition.scenario, round_parameters(condition))
+        try:
+            await send_json(tracker, {"hand": hand_start(led, HandSample.at_rest(led))})
+            self._seat.on_run = lambda hand: send_json(tracker, {"hand": hand})
+            await self._seat.tracker_came(there=True)
+            await self._follow(tracker)
+        except (WebSocketDisconnect, RuntimeError):
+            pass
+        finally:
+            self._tracker, self._seat.on_run = None, None
+            await self._seat.tracker_came(there=False)
+
+    async def _follow(self, tracker: WebSocket) -> None:
+        rate, timer = MessageRate(), RefusalTimer()
+        while True:
+            try:
+                fault, text = "", await receive_text(tracker)
+            except BinaryMessage as e:
+                fault, text = str(e), ""
+            if rate.count() > page_messages.FLOOD:
+                await refuse(tracker, too_many(page_messages.FLOOD), POLICY_VIOLATION)
+                return
+            try:
+                if fault:
+                    raise InvalidHandMessage(fault)
+                self._seat.lead_by_tracker(text)
+            except InvalidHandMessage as e:
+                if timer.is_due(str(e).partition(":")[0]):
+                    await send_json(tracker, {"refused": str(e)})
+
 
 _GRACE = 30
 """Time for a run under way to end when the server does, s."""

@@ -1,4 +1,7 @@
-"""A trial: one run in a process of its own, whose hand is led from outside and whose state is seen as it goes on."""
+"""A trial: one run in a process of its own, whose hand is led from outside and whose state is seen as it goes on.
+
+Its latency is the time from a hand's movement to the picture that shows it, as the page measures it, over a round.
+"""
 
 import asyncio
 import contextlib
@@ -10,7 +13,7 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -33,7 +36,58 @@ from handover.scenarios.runs.results.tolerated_faults import ToleratedFaults
 from handover.scenarios.study.folder.session_folder import RoundRecord
 from handover.scenarios.study.folder.session_notes import timestamp
 from handover.scenarios.study.plan.led_hands import led_hand_of
-from handover.scenarios.study.session.latency import LatencyLog, median_ms
+
+_LONGEST = 60_000.0
+"""Time that counts as a measurement at most, ms; a page that was hidden for longer draws nothing."""
+_MOST = 100_000
+"""Measurements that are kept: of half an hour at 60 pictures a second."""
+
+
+class LatencyLog:
+    """Times from input to drawn picture in a round, ms: one for each picture that shows a newer sample of the hand."""
+
+    def __init__(self) -> None:
+        self._times: list[float] = []
+
+    def add(self, values: Any) -> None:
+        """Add times that a page has measured.
+
+        Raises:
+            ValueError: they are no list of finite times from 0 on, in ms; none of them is added.
+        """
+        given: list[Any] = cast(list[Any], values) if isinstance(values, list) else [None]
+        if not all(_is_time(v) for v in given):
+            raise ValueError(f"drawn takes a list of times from 0 to {_LONGEST:g} ms")
+        self._times += [float(v) for v in given][: _MOST - len(self._times)]
+
+    @property
+    def median(self) -> float | None:
+        """Median, ms; None if nothing was measured."""
+        return self._quantile(0.5)
+
+    @property
+    def p95(self) -> float | None:
+        """Time that 5 of 100 pictures exceed, ms."""
+        return self._quantile(0.95)
+
+    @property
+    def longest(self) -> float | None:
+        """The longest of them, ms."""
+        return self._quantile(1.0)
+
+    def _quantile(self, share: float) -> float | None:
+        return round(float(np.quantile(self._times, share)), 3) if self._times else None
+
+
+def _is_time(value: Any) -> bool:
+    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    return is_number and 0.0 <= value <= _LONGEST
+
+
+def median_ms(ages: Sequence[float]) -> float | None:
+    """Return the median of ages in s, in ms; None of none."""
+    return round(1000.0 * float(np.median(ages)), 3) if len(ages) else None
+
 
 _POLL = 0.02
 """How often a run's folder is looked at until it stands at its start, s."""

@@ -8,8 +8,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 from support.wording import Wording
 
-from handover.controllers.free_flyer.arm_impedance import ArmAtRest
 from handover.controllers.free_flyer.arm_impedance_controller import (
+    ArmAtRest,
     ArmImpedanceController,
     Inputs,
     InvalidControllerParameters,

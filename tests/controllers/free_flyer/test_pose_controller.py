@@ -11,8 +11,14 @@ from support.restored_states import assert_continues, assert_outputs_change_noth
 from support.wording import Wording
 
 from handover.controllers.free_flyer.body import InvalidControllerParameters
-from handover.controllers.free_flyer.pose_controller import Inputs, Outputs, Params, PoseController
-from handover.controllers.free_flyer.profile import Bounds, profile_between
+from handover.controllers.free_flyer.pose_controller import (
+    Bounds,
+    Inputs,
+    Outputs,
+    Params,
+    PoseController,
+    profile_between,
+)
 from handover.cosim.blocks.geometry import rotation_of
 from handover.cosim.blocks.ports import Floats
 from handover.plants.free_flyer.robot.free_flyer import FreeFlyer

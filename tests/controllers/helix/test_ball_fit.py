@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 
 from handover.controllers.helix.vision.ball import BallFinder, Disc
-from handover.controllers.helix.vision.ball_edges import edges, green_ends, outline_of
-from handover.controllers.helix.vision.ball_fit import BallFit
+from handover.controllers.helix.vision.ball_fit import BallFit, edges, green_ends, outline_of
 from handover.controllers.helix.vision.stereo import BallPosition, Pixels, Region, triangulate
 from handover.cosim.blocks.geometry import Pinhole, looking_at, quaternion_of
 from handover.cosim.blocks.ports import Floats

@@ -7,7 +7,7 @@ import pytest
 from support.controllers.vision_scenes import anywhere
 from support.wording import Wording
 
-from handover.controllers.helix.vision.ball_edges import edges, outline_of
+from handover.controllers.helix.vision.ball_fit import edges, outline_of
 from handover.controllers.helix.vision.calibration import TooFewCorners, camera_pose
 from handover.controllers.helix.vision.detector_calibration import Shift, TooFewPictures, calibrate_detector
 from handover.controllers.helix.vision.markers import MarkerReader, MarkerRing

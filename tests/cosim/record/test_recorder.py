@@ -209,7 +209,7 @@ PROGRAM = """
 from pathlib import Path
 import numpy as np
 from handover.cosim.record.recorder import Recorder
-from handover.scenarios.runs.results.system_facts import peak_memory
+from handover.scenarios.runs.results.summary import peak_memory
 from support.cosim.signals_of import signals_of
 
 def record(name, rows):

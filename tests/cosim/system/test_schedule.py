@@ -12,7 +12,7 @@ from support.wording import Wording
 from handover.cosim.blocks.variable import Causality, Kind
 from handover.cosim.exceptions import ScheduleError
 from handover.cosim.fmu.file.description import FmuDescription, FmuPort
-from handover.cosim.system.ordering import ordered, strongly_connected
+from handover.cosim.system.loops import ordered, strongly_connected
 from handover.cosim.system.schedule import Schedule
 from handover.cosim.system.system import PlacedUnit, PortName, System
 

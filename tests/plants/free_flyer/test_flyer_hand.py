@@ -12,7 +12,6 @@ from handover.cosim.blocks.plain_rotation import IDENTITY, ZERO, Vector, from_ro
 from handover.cosim.blocks.ports import Floats
 from handover.plants.free_flyer.hand.attachment import Frame
 from handover.plants.free_flyer.hand.box import Box
-from handover.plants.free_flyer.hand.effort import Effort, force_at_rest
 from handover.plants.free_flyer.hand.finger_contact import HandFingers
 from handover.plants.free_flyer.hand.floating_object import FloatingObject
 from handover.plants.free_flyer.hand.flyer_hand import FlyerHand
@@ -28,6 +27,7 @@ from handover.plants.free_flyer.hand.hand_kinematics import (
     joint_places,
     phalanges,
 )
+from handover.plants.free_flyer.hand.person import Effort, force_at_rest
 
 END = (0.0, 0.07, 0.0)
 

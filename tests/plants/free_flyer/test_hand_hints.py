@@ -13,7 +13,7 @@ from handover.cosim.record.reader import Record
 from handover.plants.free_flyer.hand.hand_and_object import Driver, Holder, StartHolder
 from handover.plants.free_flyer.hand.hand_kinematics import CLOSED
 from handover.scenarios.experiment.live_inputs import HandHint
-from handover.scenarios.robots.free_flyer.handover.hand_hints import hand_hint
+from handover.scenarios.robots.free_flyer.handover.handovers import hand_hint
 
 LED = replace(IDLE, driven_by=Driver.OUTSIDE, object_with=StartHolder.FREE, angle_0=0.79)
 BEST = np.array([0.0, 0.045, 0.0])

@@ -13,7 +13,7 @@ from support.in_process_pool import InProcessPool
 
 from handover.cosim.files import folder_locked
 from handover.scenarios.runs.campaign import plan_check, pool_config
-from handover.scenarios.runs.campaign.local_pool import LocalPool
+from handover.scenarios.runs.campaign.pool_config import LocalPool
 from handover.scenarios.runs.campaign.table import CampaignTable
 from handover.scenarios.runs.campaign.worker_pool import RunJob
 from handover.scenarios.runs.execution.errors import ClusterLost, PoolError

@@ -7,7 +7,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from handover.scenarios.runs.results.system_facts import peak_memory
+from handover.scenarios.runs.results.summary import peak_memory
 from support.benchmarks.ring_hosts import HOSTS
 
 UNITS, WARM = 50, 500_000

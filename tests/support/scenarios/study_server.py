@@ -21,11 +21,10 @@ from handover.scenarios.study.folder.study_folder import StudyFolder
 from handover.scenarios.study.plan.led_hands import led_hand_of
 from handover.scenarios.study.plan.plan import StudyPlan, default_plan, parse_plan
 from handover.scenarios.study.session import seat as seat_module
-from handover.scenarios.study.session.latency import LatencyLog
 from handover.scenarios.study.session.protocol import Protocol
 from handover.scenarios.study.session.seat import StudySeat
 from handover.scenarios.study.session.server import StudyServer, page_server
-from handover.scenarios.study.session.trial import Frame, TrialRequest
+from handover.scenarios.study.session.trial import Frame, LatencyLog, TrialRequest
 
 HOST = "127.0.0.1"
 SHORT = default_plan().replace("practice = 600 ", "practice = 0 ") + "\n[parameters]\npatience = 30\n"

@@ -25,8 +25,8 @@ from handover.scenarios.published.helix.helix_1 import Helix1
 from handover.scenarios.published.published_experiment import Claim, PaperResults, Verdict, draw_figures, write_claims
 from handover.scenarios.runs.campaign.campaign import run_campaign
 from handover.scenarios.runs.campaign.folder import CampaignFolder
-from handover.scenarios.runs.campaign.local_pool import LocalPool
 from handover.scenarios.runs.campaign.plan_check import checked_plan, prepared
+from handover.scenarios.runs.campaign.pool_config import LocalPool
 from handover.scenarios.runs.campaign.statistics import MIN_SAMPLES
 from handover.scenarios.runs.campaign.table import CampaignTable
 

@@ -9,8 +9,7 @@ from handover.controllers.free_flyer.handover_state_machine import HandoverPhase
 from handover.cosim.system.signals import Signals
 from handover.scenarios.robots.free_flyer.handover.person_evaluation import Cause
 from handover.scenarios.robots.free_flyer.parameters import TeamParameters
-from handover.scenarios.robots.free_flyer.two_robots.team_evaluation import TeamEvaluator
-from handover.scenarios.robots.free_flyer.two_robots.team_member import TeamCause
+from handover.scenarios.robots.free_flyer.two_robots.team_evaluation import TeamCause, TeamEvaluator
 
 UNTURNED = np.array([1.0, 0.0, 0.0, 0.0])
 

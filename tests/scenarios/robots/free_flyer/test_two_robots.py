@@ -15,8 +15,7 @@ from handover.cosim.record.reader import Record
 from handover.plants.free_flyer.large_object.parameters import Params as LargeObjectParams
 from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters
 from handover.scenarios.robots.free_flyer.parameters import Hands, TeamParameters, TeamTask
-from handover.scenarios.robots.free_flyer.two_robots.team_evaluation import TeamEvaluator
-from handover.scenarios.robots.free_flyer.two_robots.team_member import OneRobot, TeamCause
+from handover.scenarios.robots.free_flyer.two_robots.team_evaluation import OneRobot, TeamCause, TeamEvaluator
 from handover.scenarios.robots.free_flyer.two_robots.two_robots import TwoRobots
 
 

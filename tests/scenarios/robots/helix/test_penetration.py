@@ -9,10 +9,9 @@ import pytest
 from handover.cosim.system.system import PlacedUnit, System
 from handover.fmus.build import cached
 from handover.scenarios.experiment.parameters import InvalidParameter
-from handover.scenarios.robots.helix.helix_handover import HelixHandover
+from handover.scenarios.robots.helix.helix_handover import HelixHandover, start_faults
 from handover.scenarios.robots.helix.helix_reflex_grasp import HelixReflexGrasp
 from handover.scenarios.robots.helix.helix_use_case import HelixUseCase
-from handover.scenarios.robots.helix.penetration import start_faults
 from handover.scenarios.runs.execution.unit_values import built_system
 
 SCENARIOS = (HelixHandover, HelixUseCase, HelixReflexGrasp)

@@ -14,8 +14,7 @@ from handover.cosim.record.reader import Record
 from handover.cosim.system.signals import Signals
 from handover.fmus.build import cached
 from handover.plants.helix.hand.partner_parameters import Holder
-from handover.scenarios.robots.helix.helix_reflex_grasp import HelixReflexGrasp, offered
-from handover.scenarios.robots.helix.reflex_grasp_evaluation import ReflexGraspEvaluator
+from handover.scenarios.robots.helix.helix_reflex_grasp import HelixReflexGrasp, ReflexGraspEvaluator, offered
 from handover.scenarios.robots.helix.reflex_grasp_parameters import LastStretch, Offer, ReflexGraspParameters
 from handover.scenarios.robots.helix.workspace import cameras_that_see, reach
 

@@ -19,9 +19,8 @@ from handover.cosim.system.signals import Signals
 from handover.fmus.build import cached
 from handover.plants.helix.hand.partner_parameters import Holder
 from handover.plants.helix.hand.partner_parameters import Params as HandParams
-from handover.scenarios.robots.helix.helix_use_case import HelixUseCase, UseCaseParameters
+from handover.scenarios.robots.helix.helix_use_case import HelixUseCase, UseCaseEvaluator, UseCaseParameters
 from handover.scenarios.robots.helix.parameters import Tuning
-from handover.scenarios.robots.helix.use_case_evaluation import UseCaseEvaluator
 
 P = UseCaseParameters()
 OVER = P.p_WG_drop

@@ -12,8 +12,7 @@ from handover.cosim.system.system import System
 from handover.fmus.build import cached
 from handover.scenarios.robots.free_flyer.push.impedance import FlyerImpedance
 from handover.scenarios.robots.ir_grasp.ir_grasp import IrGrasp
-from handover.scenarios.runs.results.summary import parameter_rows
-from handover.scenarios.runs.results.system_facts import describe_system
+from handover.scenarios.runs.results.summary import describe_system, parameter_rows
 from handover.scenarios.runs.results.task import Task
 
 

@@ -22,10 +22,10 @@ from handover.scenarios.runs.results.summary import (
     configuration,
     crashed_summary,
     metric_data,
+    peak_memory,
     unstarted_run,
     unstarted_summary,
 )
-from handover.scenarios.runs.results.system_facts import peak_memory
 from handover.scenarios.runs.results.tables import format_metric
 
 
@@ -70,6 +70,6 @@ def test_without_the_system_telling_memory_there_is_no_figure_of_it(monkeypatch:
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems tell of the program alone")
 def test_a_small_program_that_a_large_one_started_tells_its_own_memory():
     ballast = b"x" * 300_000_000  # Python itself takes some 60 MB, and twice that where it compiles what it imports
-    call = "from handover.scenarios.runs.results.system_facts import peak_memory; print(peak_memory())"
+    call = "from handover.scenarios.runs.results.summary import peak_memory; print(peak_memory())"
     done = subprocess.run([sys.executable, "-c", call], check=True, capture_output=True, text=True)
     assert 1e7 < float(done.stdout) < len(ballast)

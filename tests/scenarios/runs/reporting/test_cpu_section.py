@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from handover.scenarios.runs.reporting.cpu_section import cpu_section
+from handover.scenarios.runs.reporting.run_page import cpu_section
 
 
 def unit(name: str, seconds: float | None, steps: int | None = 100) -> dict[str, Any]:

@@ -22,7 +22,7 @@ from handover.scenarios.runs.reporting.graph import graph_section
 from handover.scenarios.runs.reporting.html import picture_source
 from handover.scenarios.runs.reporting.run_page import write_run_page
 from handover.scenarios.runs.results.run_folder import InvalidRunFolder, RunFolder
-from handover.scenarios.runs.results.system_facts import describe_system
+from handover.scenarios.runs.results.summary import describe_system
 
 SVG = "image/svg+xml"
 

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from handover.scenarios.experiment.pictures import CameraPicture, Mark
-from handover.scenarios.runs.reporting.pictures_section import pictures_section
+from handover.scenarios.runs.reporting.run_page import pictures_section
 from handover.scenarios.runs.results.pictures import write_picture_files
 from handover.scenarios.runs.results.run_folder import RunFolder
 

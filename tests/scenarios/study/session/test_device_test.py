@@ -7,7 +7,7 @@ import pytest
 
 from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.live_inputs import LedHand
-from handover.scenarios.study.session.device_test import DeviceTest
+from handover.scenarios.study.session.practice import DeviceTest
 
 REST = (-0.4, 0.1, -0.05)
 LED = LedHand("person", REST, 0.8)

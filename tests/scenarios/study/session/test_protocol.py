@@ -12,7 +12,7 @@ from support.wording import Wording
 from handover.scenarios.experiment.live_inputs import LedHand
 from handover.scenarios.runs.reporting.page import asset
 from handover.scenarios.study.folder.study_folder import StudyFolder
-from handover.scenarios.study.session.device_test import DeviceTest
+from handover.scenarios.study.session.practice import DeviceTest
 from handover.scenarios.study.session.protocol import MOST_ATTEMPTS, SCREENS, InvalidAction, Protocol
 from handover.scenarios.study.session.screen_content import VoidCause
 from handover.scenarios.study.session.server import page_words

@@ -32,7 +32,7 @@ from websockets.sync.client import ClientConnection
 from handover.cosim.exceptions import RecordNotWritten
 from handover.scenarios.study.folder.study_folder import StudyFolder
 from handover.scenarios.study.session import seat as seat_module
-from handover.scenarios.study.session.device_test import Reached
+from handover.scenarios.study.session.practice import Reached
 from handover.scenarios.study.session.protocol import Protocol
 from handover.scenarios.study.session.screen_content import VoidCause
 from handover.scenarios.study.session.served_study import line_of_round

@@ -12,7 +12,7 @@ import pytest
 from distributed import Client
 from support.scenarios.sample_jobs import job, quick_job
 
-from handover.scenarios.runs.campaign import run_servers, worker
+from handover.scenarios.runs.campaign import cluster, run_servers
 from handover.scenarios.runs.campaign.run_job import run_job
 from handover.scenarios.runs.campaign.run_servers import JobRunner, ServerProcess
 from handover.scenarios.runs.results.run_folder import versions
@@ -34,16 +34,16 @@ def test_a_job_of_a_batch_that_has_been_ended_starts_no_server(tmp_path: Path, m
 
     def lost(client: Client, batch: str) -> str:
         arguments: list[Any] = [quick_job(tmp_path / "runs"), batch, versions()]
-        return client.submit(worker.run_job_on_worker, *arguments, pure=False).result(timeout=60).lost
+        return client.submit(cluster.run_job_on_worker, *arguments, pure=False).result(timeout=60).lost
 
     monkeypatch.setattr(run_servers, "ServerProcess", started_server)
-    monkeypatch.setattr(worker, "JobRunner", noted_runner)
+    monkeypatch.setattr(cluster, "JobRunner", noted_runner)
     with Client(processes=False, n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0") as client:
-        client.run(worker.end_runs, "ended")
+        client.run(cluster.end_runs, "ended")
         assert lost(client, "ended") == "it was ended, as nobody waited for it"
         assert started == []
         assert lost(client, "wanted") == ""
-        client.run(worker.end_runs, "wanted")
+        client.run(cluster.end_runs, "wanted")
         assert [server.lives for server in started] == [False]
         assert lost(client, "wanted") == "it was ended, as nobody waited for it"
         assert len(started) == 1
