@@ -32,6 +32,6 @@ def rows() -> list[Any]:
 
 
 @pytest.mark.parametrize(("fault", "fmi", "way"), rows())
-def test_a_fault_is_told_and_harms_nothing_else(fault: Fault, fmi: int, way: str, tmp_path: Path):
+def test_a_fault_is_reported_and_harms_nothing_else(fault: Fault, fmi: int, way: str, tmp_path: Path):
     seen = run_fault(fault, fmi, way, tmp_path)
     assert not faults_of(fault, fmi, way, seen), seen.output

@@ -39,7 +39,7 @@ def test_values_that_a_unit_resets_as_it_is_set_up_hold(fmi: int, compiled: bool
 
 
 @STANDARDS
-def test_all_values_that_do_not_hold_are_told_at_once(fmi: int, wording: Wording):
+def test_all_values_that_do_not_hold_are_reported_at_once(fmi: int, wording: Wording):
     s = alone("keeps_constants", fmi, **START)
     s.add("other", native_fmu("keeps_single_precision", fmi), k=0.1)
     with pytest.raises(InitializationError) as caught, Master(s):

@@ -96,7 +96,7 @@ def test_a_module_that_a_block_itself_lacks_is_named_with_the_extra_that_brings_
         ("\nfrom math import no_such_name\n", PackageFailure, r"own_fault\.py, line 2"),
     ],
 )
-def test_an_error_of_the_blocks_own_module_is_told_with_its_place(
+def test_an_error_of_the_blocks_own_module_is_reported_with_its_place(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: str, error: type[Exception], told: str
 ):
     (tmp_path / "own_fault.py").write_text(code)

@@ -62,7 +62,7 @@ def test_finds_the_shifts_without_knowing_the_poses():
     assert 0.0 < found.edge_shift.error < 0.01
 
 
-def test_a_shift_is_told_with_its_error_and_too_few_pictures_are_refused(wording: Wording):
+def test_a_shift_is_reported_with_its_error_and_too_few_pictures_are_refused(wording: Wording):
     wording.check(Shift(0.2114, 0.0123, 14))
     empty = np.zeros((720, 1280, 3), dtype=np.uint8)
     with pytest.raises(TooFewPictures) as caught:

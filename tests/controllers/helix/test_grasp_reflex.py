@@ -128,7 +128,7 @@ def test_without_fingers_measurements_go_through_as_they_are():
         np.testing.assert_array_equal(y.P_O, u.cov_O)
 
 
-def test_far_from_the_ball_or_too_long_after_what_is_not_seen_is_not_told():
+def test_far_from_the_ball_or_too_long_after_what_is_not_seen_is_not_reported():
     reflex = GraspReflex(P)
     reflex.step(0.0, 0.1, seen([0.0, 0.0, 0.2]))
     y = reflex.step(0.1, 0.1, Inputs())

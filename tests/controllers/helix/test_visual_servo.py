@@ -237,7 +237,7 @@ def test_a_lost_ring_is_found_where_it_was_seen_last():
 
 
 @pytest.mark.parametrize(("name", "verdict"), [("seen_R", Verdict.LOST_RING), ("seen_O", Verdict.LOST_BALL)])
-def test_what_is_not_found_again_is_told_and_what_comes_back_in_time_is_no_loss(name: str, verdict: Verdict):
+def test_what_is_not_found_again_is_reported_and_what_comes_back_in_time_is_no_loss(name: str, verdict: Verdict):
     run = own()
     y = run.run(Phase.GIVEN_UP, ball_at(0.0), edit=unseen(2.0, **{name: False}))
     assert (y.phase, y.verdict, y.closure) == (Phase.GIVEN_UP, verdict, 0.0)
@@ -256,7 +256,7 @@ def test_a_measurement_far_off_is_refused_and_many_are_believed():
         assert (np.linalg.norm(y.p_WR_est - run.arm.pose()[:3]) < 0.02) == (n < 3), n
 
 
-def test_a_ball_out_of_the_models_reach_is_told_from_one_that_a_sagging_arm_cannot_reach():
+def test_a_ball_out_of_the_models_reach_is_reported_from_one_that_a_sagging_arm_cannot_reach():
     for p_WO, verdict in ((FAR, Verdict.OUT_OF_REACH), (np.array([0.5, 0.0, -0.3]), Verdict.LIMITS)):
         run = own(patience=15)
         y = run.run(Phase.GIVEN_UP, p_WO)
@@ -306,7 +306,7 @@ def test_jitter_draws_each_control_period_evenly_about_the_nominal_one():
     assert jittered.mean() == pytest.approx(0.5, abs=0.12)
 
 
-def test_what_does_not_converge_is_told(monkeypatch: pytest.MonkeyPatch):
+def test_what_does_not_converge_is_reported(monkeypatch: pytest.MonkeyPatch):
     def told(**values: Any) -> tuple[bool, bool]:
         y: Outputs = own(**values).run(Phase.DESCEND, ball_at(0.0))
         return y.estimate_converged, y.step_converged

@@ -34,7 +34,7 @@ def found_in_run(file: Path) -> list[Finding]:
         ("state_off_by_1e2", 3, Level.FAULT, 1e-2),
     ],
 )
-def test_what_a_restored_state_is_off_by_is_told_with_its_size(fmi: int, unit: str, level: Level, share: float):
+def test_what_a_restored_state_is_off_by_is_reported_with_its_size(fmi: int, unit: str, level: Level, share: float):
     (finding,) = found_in_run(native_fmu(unit, fmi))
     assert finding.level is level
     assert finding.where == ("fmi2SetFMUstate" if fmi == 2 else "fmi3SetFMUState")
@@ -55,7 +55,7 @@ def test_a_derivative_that_the_library_does_not_know_is_found(tmp_path: Path, fm
 
 
 @pytest.mark.slow
-def test_locals_that_the_search_does_not_come_to_are_told(tmp_path: Path):
+def test_locals_that_the_search_does_not_come_to_are_reported(tmp_path: Path):
     file = with_locals(tmp_path, 3, {f"der(x_{i})": 77 for i in range(40)})
     *faults, last = found_in_run(file)
     assert {f.level for f in faults} == {Level.FAULT}
@@ -148,7 +148,7 @@ def test_a_file_that_is_replaced_is_read_again(edited: Edited, fmi: int):
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_a_unit_that_needs_another_tool_is_told(edited: Edited, caplog: pytest.LogCaptureFixture, fmi: int):
+def test_a_unit_that_needs_another_tool_is_reported(edited: Edited, caplog: pytest.LogCaptureFixture, fmi: int):
     system = System()
     system.add("gain", edited("gain", fmi, ("<CoSimulation ", '<CoSimulation needsExecutionTool="true" ')))
     with caplog.at_level(logging.WARNING):

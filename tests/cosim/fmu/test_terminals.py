@@ -78,7 +78,7 @@ AGAIN = '<TerminalMemberVariable variableName="y" memberName="a" variableKind="s
         "document type", "not well-formed",
     ],
 )  # fmt: skip
-def test_what_breaks_the_standard_is_told_and_keeps_no_unit_from_being_described(
+def test_what_breaks_the_standard_is_reported_and_keeps_no_unit_from_being_described(
     tmp_path: Path, terminals: str, wording: Wording
 ):
     file = unit(tmp_path, terminals)

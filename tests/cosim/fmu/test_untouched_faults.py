@@ -47,7 +47,7 @@ OUT_OF_OUTPUTS = '<Outputs><Unknown index="3" dependencies=""/>'
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_a_fault_of_what_only_others_read_is_told_and_what_is_read_is_the_same(
+def test_a_fault_of_what_only_others_read_is_reported_and_what_is_read_is_the_same(
     edited: Edited, fmi: int, wording: Wording
 ):
     sound = describe_fmu(native_fmu("mass", fmi))

@@ -257,7 +257,7 @@ def test_it_runs_with_this_python(doubling: Path, monkeypatch: pytest.MonkeyPatc
     assert rows == [(t, pytest.approx(2.0 * t)) for t in (0.0, 0.1, 0.2, 0.3, 0.4, 0.5)]
 
 
-def test_where_this_python_has_no_library_cause_and_cure_are_told(doubling: Path, monkeypatch: pytest.MonkeyPatch):
+def test_where_this_python_has_no_library_cause_and_cure_are_reported(doubling: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(unit_process, "_libpython", lambda: "")
     with pytest.raises(InvalidFmu) as told:
         isolated(doubling).__enter__()

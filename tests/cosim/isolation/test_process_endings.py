@@ -83,7 +83,7 @@ def test_a_unit_that_ends_its_process(phase: str, fault: str, fmi: int, compiled
         assert [c for u, c in ends if u == unit] == [f"fmi{fmi}{name}" for name in (*begun, "FreeInstance")]
 
 
-def test_a_unit_s_process_that_somebody_killed_is_told_as_that():
+def test_a_unit_s_process_that_somebody_killed_is_reported_as_that():
     master = Master(fed_by(native_fmu("gain"), 3), MasterOptions(isolated=("bad",)))
 
     def kill(_t: float, _signals: object) -> None:

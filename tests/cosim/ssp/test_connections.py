@@ -186,7 +186,7 @@ def test_a_prefix_that_a_vendor_does_not_declare_does_not_matter(opened: Open):
     assert ["prefixes" in line and line.startswith("SystemStructure.ssd: ") for line in ssp.system.tolerated] == [True]
 
 
-def test_what_is_not_supported_is_told_with_what_does_not_fit(tmp_path: Path, wording: Wording):
+def test_what_is_not_supported_is_reported_with_what_does_not_fit(tmp_path: Path, wording: Wording):
     typed = '<ssd:Connector name="{}" kind="{}"><ssc:{}/></ssd:Connector>'.format
     truth = typed("truth", "output", "Boolean") + typed("truth_in", "input", "Boolean")
     ends = f"<ssd:Connectors>{typed('count', 'output', 'Integer')}{truth}</ssd:Connectors>"

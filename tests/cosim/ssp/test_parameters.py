@@ -280,7 +280,7 @@ def test_a_system_s_parameter_is_in_the_unit_of_its_connector(fmu: Path):
         assert {"s.a.p", "s.a.on"} < ssp.parameters.keys()
 
 
-def test_what_is_wrong_with_a_given_value_is_told(fmu: Path, wording: Wording):
+def test_what_is_wrong_with_a_given_value_is_reported(fmu: Path, wording: Wording):
     for given in ("a.onn=true", "a.u=1", "a.on=maybe", "a.p=1", "a.p[3]=1", "a.light=blue"):
         name, _, value = given.partition("=")
         with pytest.raises(InvalidSsp) as caught:

@@ -75,7 +75,7 @@ def test_a_page_has_each_of_its_units_in_every_form_and_host():
         ([{"a": 1.0, "c": 2.0}], [], inf, ["c"]),
     ],
 )
-def test_what_differs_is_told(
+def test_what_differs_is_reported(
     found: list[dict[str, float]], pictures: list[dict[str, bytes]], off: float, named: list[str]
 ):
     wanted = Record([{"a": 1.0, "b": 2.0}], [{"left": b"12"}])

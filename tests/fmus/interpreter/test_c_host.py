@@ -156,7 +156,7 @@ LISTED: dict[str, tuple[str | None, dict[str, str], str]] = {
 
 
 @pytest.mark.parametrize("case", LISTED)
-def test_all_that_was_tried_is_told_with_a_cure(unpacked: CtypesHost, tmp_path: Path, case: str):
+def test_all_that_was_tried_is_reported_with_a_cure(unpacked: CtypesHost, tmp_path: Path, case: str):
     note, environment, told = LISTED[case]
     if note is not None:
         note_of(unpacked).write_text(note)

@@ -119,7 +119,7 @@ def test_instances_share_a_process_that_ends_with_the_last(host: CtypesHost):
 
 
 @pytest.mark.slow
-def test_a_crash_is_told_to_every_instance_and_each_can_go_on_after_a_reset(host: CtypesHost):
+def test_a_crash_is_reported_to_every_instance_and_each_can_go_on_after_a_reset(host: CtypesHost):
     first, second = instance(host), instance(host)
     assert asked_for(first, Deed.CRASH) == ERROR
     assert "ended by signal 11 (Segmentation fault)" in first.log[-1]

@@ -83,7 +83,7 @@ def test_what_cannot_be_followed_is_refused_with_file_line_and_reason(
     wording.check(refused.value)
 
 
-def test_all_faults_are_told_at_once_and_the_first_lines_of_each(tmp_path: Path, wording: Wording):
+def test_all_faults_are_reported_at_once_and_the_first_lines_of_each(tmp_path: Path, wording: Wording):
     rows = [(t, pose._replace(angles=(2.0,) * JOINTS, q=(2.0, 0.0, 0.0, 0.0))) for t, pose in poses(10)]
     write_track(tmp_path / "t.csv", rows)
     with pytest.raises(InvalidTrack) as refused:

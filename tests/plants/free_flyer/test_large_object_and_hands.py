@@ -243,7 +243,7 @@ def test_the_middle_of_grippers_lies_along_the_line_between_them():
     np.testing.assert_allclose(rotate(askew.R, (0.0, 1.0, 0.0)), y, atol=1e-9)
 
 
-def test_faults_are_told_all_at_once(wording: Wording):
+def test_faults_are_reported_all_at_once(wording: Wording):
     false = Params(p_OH=np.array([-0.2, 0.0, 0.0]), motion=Motion.GIVE, hand_spacing=0.05, pull_direction=np.zeros(3))
     with pytest.raises(InvalidLargeObjectParameters) as e:
         LargeObjectAndHands(false)

@@ -213,7 +213,7 @@ CALLS: dict[str, Callable[[Any], object]] = {
 
 
 @pytest.mark.parametrize("call", CALLS)
-def test_what_cannot_be_run_is_told_in_one_sentence_and_nothing_is_written(
+def test_what_cannot_be_run_is_reported_in_one_sentence_and_nothing_is_written(
     call: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wording: Wording
 ):
     monkeypatch.chdir(tmp_path)
@@ -231,7 +231,7 @@ def test_options_go_with_arguments_that_they_leave_open_or_say_alike():
     assert [*signature(handover.MasterOptions).parameters] == [f.name for f in fields(handover.MasterOptions)]
 
 
-def test_a_file_in_a_run_s_folder_is_told_to_be_one(tmp_path: Path):
+def test_a_file_in_a_run_s_folder_is_reported_to_be_one(tmp_path: Path):
     file = tmp_path / "run.json"
     file.write_text("{}")
     with pytest.raises(handover.InvalidInput, match="it is a file; expected the folder"):

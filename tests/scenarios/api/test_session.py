@@ -154,7 +154,7 @@ def test_a_state_of_a_session_with_other_parameters_is_refused(
 
 
 @pytest.mark.parametrize("name", ["stop", "inputs", "out"])
-def test_arguments_of_runs_alone_are_told_as_such(name: str):
+def test_arguments_of_runs_alone_are_reported_as_such(name: str):
     with pytest.raises(handover.InvalidInput) as refused:
         handover.open(native_fmu("gain"), **dict[str, Any]({name: 1}))
     assert f"; {name}: a session " in str(refused.value)

@@ -133,7 +133,7 @@ def test_a_sweep_has_a_table_of_values_to_vary(tmp_path: Path):
     ],
     ids=str.strip,
 )
-def test_what_is_wrong_is_told_in_one_line_and_nothing_is_written(text: str, tmp_path: Path, wording: Wording):
+def test_what_is_wrong_is_reported_in_one_line_and_nothing_is_written(text: str, tmp_path: Path, wording: Wording):
     file = tmp_path / ("run.json" if text.startswith(("[", "{")) else "run.toml")
     file.write_text(text, encoding="utf-8")
     told = refusal("run", "--config", file, "--out", tmp_path / "out")
@@ -202,7 +202,7 @@ def test_all_options_of_the_master_are_repeated(first: Path, tmp_path: Path):
     assert limits(0.0, 0.5) == {"call_limit": None, "pace": 0.5}
 
 
-def test_other_versions_and_files_that_are_gone_are_told(first: Path, tmp_path: Path, wording: Wording):
+def test_other_versions_and_files_that_are_gone_are_reported(first: Path, tmp_path: Path, wording: Wording):
     data, file = data_in(first, "run"), tmp_path / "run.json"
     data["versions"]["numpy"] = "0.1"
     data["files"]["reflex"] = str(tmp_path / "gone.fmu")

@@ -16,7 +16,9 @@ from handover.scenarios.runs.execution.errors import UsageError
 ROOT = Path(__file__).parents[3]
 
 
-def test_a_folder_that_is_none_is_told_before_an_extra_that_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_folder_that_is_none_is_reported_before_an_extra_that_is_missing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
     def lacking(*_: str) -> None:
         raise UsageError("matplotlib missing")
 

@@ -85,7 +85,7 @@ def test_list_as_data():
     assert [p["name"] for p in unit["outputs"]] == ["f_B", "tau_B", "saturated", "flapper_angles", "impeller_speeds"]
 
 
-def test_a_unit_whose_package_is_missing_is_told_in_one_line(monkeypatch: pytest.MonkeyPatch):
+def test_a_unit_whose_package_is_missing_is_reported_in_one_line(monkeypatch: pytest.MonkeyPatch):
     def lacking(path: str) -> type[Any]:
         raise PackageFailure(path, "exudyn is missing")
 
@@ -101,13 +101,13 @@ class Misplaced(IrGrasp):
     places: ClassVar[Mapping[str, Place]] = {"reflex": Place(required={"sigma_cmt": ""})}
 
 
-def test_a_place_with_a_port_that_there_is_not_is_told():
+def test_a_place_with_a_port_that_there_is_not_is_reported():
     for show in (place_data, print_place):
         with pytest.raises(UsageError, match="place reflex: 'sigma_cmt' is not a port or parameter of IrReflex"):
             show(Misplaced, "reflex")
 
 
-def test_an_export_replaces_a_file_only_when_told_to(tmp_path: Path):
+def test_an_export_replaces_a_file_only_when_reported_to(tmp_path: Path):
     file = tmp_path / "grasp.ssp"
     file.write_text("something")
     assert "it is there already; --force replaces it" in refusal("export", "ir_grasp", "--ssp", file)

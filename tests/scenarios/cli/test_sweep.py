@@ -103,7 +103,7 @@ def test_lost_runs_and_workers_that_go_are_reported_by_the_status(monkeypatch: p
     assert "1 lost: its machine burnt" in result.output
 
 
-def test_what_cannot_be_begun_is_told_before_units_are_built(here: Path, monkeypatch: pytest.MonkeyPatch):
+def test_what_cannot_be_begun_is_reported_before_units_are_built(here: Path, monkeypatch: pytest.MonkeyPatch):
     refuse_workers(monkeypatch)
     result = call(*CALL, *INTO_C)
     assert (result.exit_code, result.output) == (2, f"{BEGINNING}Error: there are none\n")

@@ -219,7 +219,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("line", CALLS.strip().splitlines())
-def test_a_usage_error_is_told_and_leaves_nothing(
+def test_a_usage_error_is_reported_and_leaves_nothing(
     line: str, folder: Path, monkeypatch: pytest.MonkeyPatch, wording: Wording
 ):
     monkeypatch.chdir(folder)

@@ -56,7 +56,7 @@ def test_parameters_are_kept_under_any_name():
     assert after.tried[0][0].side is Side.LEFT
 
 
-def test_what_cannot_be_kept_is_told_with_what_would_be_right():
+def test_what_cannot_be_kept_is_reported_with_what_would_be_right():
     evaluator = Follower(Parameters())
     with pytest.raises(NotPlainData, match="Parameters"):
         evaluator.get_state()

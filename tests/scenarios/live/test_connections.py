@@ -135,7 +135,7 @@ def test_of_more_pages_than_a_run_is_shown_in_the_last_one_is_refused(address: s
         assert (second.close_code, second.close_reason) == (1013, "1 pages are open already")
 
 
-def test_messages_are_counted_within_the_last_second_and_two_refusals_of_a_kind_a_second_are_told():
+def test_messages_are_counted_within_the_last_second_and_two_refusals_of_a_kind_a_second_are_reported():
     now = [3.0]
     timer, rate = RefusalTimer(lambda: now[0]), MessageRate(lambda: now[0])
     told: list[tuple[float, str]] = []

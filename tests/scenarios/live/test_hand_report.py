@@ -90,7 +90,7 @@ def test_the_report_is_written_where_showing_the_run_is_cancelled(tmp_path: Path
     assert json.loads((tmp_path / "run" / "inputs.json").read_text(encoding="utf-8"))["samples"] == {"test": 1}
 
 
-def test_the_end_is_told_where_the_report_cannot_be_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+def test_the_end_is_reported_where_the_report_cannot_be_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     page = Told()
     asyncio.run(page.show(shown_run(tmp_path), lambda: True))  # whose folder is not there
     assert "ended" in str(page.told[-1])

@@ -63,7 +63,7 @@ def test_a_session_of_an_fmu_has_fields_of_its_inputs_and_gives_a_file_of_them_t
     assert "last_x" in session.headline
 
 
-def test_a_fault_is_told_without_the_call_that_refused_it():
+def test_a_fault_is_reported_without_the_call_that_refused_it():
     assert without_call("p: out (fmi3GetFloat64 answered Error); set by the scenario") == "p: out; set by the scenario"
     assert without_call("x (of fmi3GetFloat64) is wrong") == "x (of fmi3GetFloat64) is wrong"
 

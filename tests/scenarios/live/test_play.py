@@ -176,7 +176,9 @@ def test_a_session_that_cannot_begin_is_refused(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_push_moves_the_robot_and_is_played_back_and_what_is_killed_is_told_as_lost(browser: Browser, tmp_path: Path):
+def test_a_push_moves_the_robot_and_is_played_back_and_what_is_killed_is_reported_as_lost(
+    browser: Browser, tmp_path: Path
+):
     out = tmp_path / "runs"
     with (
         played("flyer_impedance", out, "-p", "begin=30") as (address, session),

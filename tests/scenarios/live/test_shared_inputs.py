@@ -46,7 +46,7 @@ def test_a_sample_is_used_with_its_age_and_what_it_does_not_say_holds_on(tmp_pat
     assert (np.diff(written.ages()) < 0.0).all()
 
 
-def test_of_a_long_run_the_last_uses_are_told(tmp_path: Path):
+def test_of_a_long_run_the_last_uses_are_reported(tmp_path: Path):
     inputs = inputs_in(tmp_path)
     for k in range(20_000):
         inputs.note_use(0.016 * k, k + 1, 0.0, 1.0)

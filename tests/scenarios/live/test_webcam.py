@@ -142,7 +142,7 @@ def test_a_hand_in_a_cameras_pictures_leads_the_hand_of_a_run(tmp_path: Path):
 
 
 @pytest.mark.slow
-def test_why_a_camera_cannot_lead_is_told_and_another_device_can(tmp_path: Path):
+def test_why_a_camera_cannot_lead_is_reported_and_another_device_can(tmp_path: Path):
     folder = write_files(tmp_path / "vision", model=b"broken")
     given = (*OUTSIDE, "--webcam", str(folder), "--pace", "0.5")
     with (

@@ -43,7 +43,9 @@ def test_a_module_that_python_has_is_not_hidden(tmp_path: Path, wording: Wording
 
 
 @pytest.mark.parametrize("there", [True, False])
-def test_how_to_run_its_test_is_told_also_without_pytest(there: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_how_to_run_its_test_is_reported_also_without_pytest(
+    there: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
     def find_spec(name: str) -> bool | None:
         return there if name == "pytest" else None
 

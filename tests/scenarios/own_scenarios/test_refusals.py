@@ -89,7 +89,7 @@ def values(*given: str) -> tuple[str, ...]:
         pytest.param(("new", "scenario", "Gentle", "--for", "helix_handover:servo"), id="scenario for a place"),
     ],
 )
-def test_what_is_wrong_is_told_in_one_line_and_nothing_is_written(
+def test_what_is_wrong_is_reported_in_one_line_and_nothing_is_written(
     arguments: tuple[str, ...], prepared: Path, monkeypatch: pytest.MonkeyPatch, wording: Wording
 ):
     monkeypatch.chdir(prepared)
@@ -102,7 +102,7 @@ def test_what_is_wrong_is_told_in_one_line_and_nothing_is_written(
     wording.check(line.replace(sys.executable, "PYTHON").replace(str(prepared), "HERE"))
 
 
-def test_a_unit_that_does_not_fit_is_told_before_a_sweep_begins(
+def test_a_unit_that_does_not_fit_is_reported_before_a_sweep_begins(
     prepared: Path, monkeypatch: pytest.MonkeyPatch, wording: Wording
 ):
     monkeypatch.chdir(prepared)

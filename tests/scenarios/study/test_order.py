@@ -58,7 +58,7 @@ def test_odd_numbers_have_none(n: int):
         williams_square(n)
 
 
-def test_balance_is_told_and_that_of_complete_sessions_by_their_rows(wording: Wording):
+def test_balance_is_reported_and_that_of_complete_sessions_by_their_rows(wording: Wording):
     for told in (
         balance(PLAN),
         balance(PLAN, 10),

@@ -61,7 +61,7 @@ def test_parameters_of_all_of_a_task_and_of_a_condition_add_up_and_the_narrower_
         plan.condition("human_to_robot", "soft")
 
 
-def test_all_faults_are_told_at_once(wording: Wording):
+def test_all_faults_are_reported_at_once(wording: Wording):
     of_types = faults_of(
         ("seed = 2020", "sed = 2020"),
         ("practice = 600", 'practice = "long"'),
@@ -120,7 +120,7 @@ def test_a_file_that_is_no_plan_is_refused(tmp_path: Path, wording: Wording):
         wording.check(refused.value)
 
 
-def test_a_plan_in_whose_rounds_nobody_can_lead_a_hand_is_told(wording: Wording):
+def test_a_plan_in_whose_rounds_nobody_can_lead_a_hand_is_reported(wording: Wording):
     faults = hand_faults(parse_plan(default_plan().replace('"flyer_robot_to_human"', '"flyer_two_robots"')))
     assert len(faults) == 2
     wording.check("\n".join(faults))

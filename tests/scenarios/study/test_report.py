@@ -82,7 +82,7 @@ def test_the_page_has_all_results_with_their_origin(reported: Path):
     assert PILOT not in text.lower()
 
 
-def test_scripted_pilots_are_told_in_every_section_and_file(tmp_path: Path):
+def test_scripted_pilots_are_reported_in_every_section_and_file(tmp_path: Path):
     write_study(tmp_path / "out", 2, rigid_is_better, compliant_fails, PILOT_PLAN)
     page = report_of(tmp_path / "out")
     assert "<title>Object handover between people and a free-flying robot (scripted pilot)</title>" in page
@@ -116,7 +116,7 @@ def test_pandas_reads_all_tables_by_their_codebooks(reported: Path):
 
 
 @pytest.mark.parametrize("people", [0, 3])
-def test_too_few_are_told_and_nothing_is_computed(people: int, tmp_path: Path):
+def test_too_few_are_reported_and_nothing_is_computed(people: int, tmp_path: Path):
     write_study(tmp_path / "out", people, rigid_is_better, compliant_fails)
     text = text_of(report_of(tmp_path / "out"))
     tests = csv_of(tmp_path / "out" / "results" / "rating_tests.csv")
@@ -129,7 +129,7 @@ def test_too_few_are_told_and_nothing_is_computed(people: int, tmp_path: Path):
 
 
 @pytest.mark.slow
-def test_a_session_broken_off_and_void_rounds_are_told(tmp_path: Path):
+def test_a_session_broken_off_and_void_rounds_are_reported(tmp_path: Path):
     study_folder = write_study(tmp_path / "out", 6, rigid_is_better)
     folder = study_folder.begin(session(7))
     for planned in folder.rounds[:5]:
@@ -155,7 +155,7 @@ def test_a_session_broken_off_and_void_rounds_are_told(tmp_path: Path):
 
 
 @pytest.mark.slow
-def test_who_withdrew_is_told_with_the_time_and_nothing_else_and_what_was_kept_is_deleted_if_asked(tmp_path: Path):
+def test_who_withdrew_is_reported_with_the_time_and_nothing_else_and_what_was_kept_is_deleted_if_asked(tmp_path: Path):
     out = tmp_path / "out"
     write_study(out, 7, rigid_is_better)
     assert study("export", out).exit_code == 0
@@ -198,7 +198,7 @@ def test_a_plan_of_other_tasks_has_a_page_without_the_thesis(tmp_path: Path):
     assert set(effects["participants"]) == {0}  # each condition comes once: within it nothing goes with the order
 
 
-def test_what_is_no_study_is_told(tmp_path: Path):
+def test_what_is_no_study_is_reported(tmp_path: Path):
     for command in ("report", "export"):
         assert "is not a folder" in study(command, tmp_path / "none").output
         refused = study(command, tmp_path)

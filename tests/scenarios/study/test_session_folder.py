@@ -227,7 +227,7 @@ def test_sessions_that_lie_elsewhere_are_not_written_to(linked: str, tmp_path: P
     wording.check(refused.value)
 
 
-def test_a_damaged_file_is_told_by_its_name(tmp_path: Path, wording: Wording):
+def test_a_damaged_file_is_reported_by_its_name(tmp_path: Path, wording: Wording):
     folder = StudyFolder.opened(tmp_path / "out", PLAN).begin(session(1))
     folder.record_round(1, record())
     too_large = json.dumps({"record": asdict(record()), "answers": {"S1": 2**63}})

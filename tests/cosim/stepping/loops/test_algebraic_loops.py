@@ -217,7 +217,7 @@ def test_directional_derivatives_take_the_place_of_differences(fmi: int, monkeyp
 
 
 @pytest.mark.parametrize(("algorithm", "fmi"), [(Algorithm.JACOBI, 3), (Algorithm.GAUSS_SEIDEL, 2)])
-def test_a_presumed_loop_of_units_without_states_is_solved_at_the_start_and_told(
+def test_a_presumed_loop_of_units_without_states_is_solved_at_the_start_and_reported(
     algorithm: Algorithm, fmi: int, caplog: pytest.LogCaptureFixture, wording: Wording
 ):
     stateless: dict[str, Any] = {"canGetAndSetFMUstate" if fmi == 2 else "canGetAndSetFMUState": False}

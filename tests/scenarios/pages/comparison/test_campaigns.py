@@ -226,7 +226,7 @@ def test_a_metric_in_another_unit_and_one_that_is_unknown_are_refused(tmp_path: 
     )
 
 
-def test_all_faults_of_folders_and_names_are_told_at_once(tmp_path: Path):
+def test_all_faults_of_folders_and_names_are_reported_at_once(tmp_path: Path):
     first = campaign(tmp_path / "a", [{}])
     other = folder_of(tmp_path / "b", campaign_metadata("vsl_hybrid", [{}]), table_of([{}])).path
     broken, empty = tmp_path / "c", tmp_path / "d"

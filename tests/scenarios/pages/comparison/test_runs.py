@@ -87,7 +87,7 @@ def test_a_curve_that_lies_on_another_is_dashed(tmp_path: Path):
     assert [[c.stroke for c in p.curves] for p in plots] == [["solid", "dashed", "solid"]] * 2
 
 
-def test_a_signal_that_one_run_lacks_is_drawn_of_the_others_and_told(tmp_path: Path):
+def test_a_signal_that_one_run_lacks_is_drawn_of_the_others_and_reported(tmp_path: Path):
     first = run(tmp_path / "a", [0.0, 1.0], {"mass.x": ("m", [0.0, 1.0]), "mass.v": ("m/s", [0.0, 1.0])})
     second = run(tmp_path / "b", [0.0, 1.0], {"mass.x": ("m", [0.0, 2.0])})
     overlay = overlaid(runs(first, second), ["mass.v", "mass.x"])
@@ -127,7 +127,7 @@ def test_a_curve_that_a_unit_does_not_give_is_left_out_of_that_run_alone(grasp_w
     assert line.startswith(f"{grasp_without_reflex.name} lacks what is drawn from reflex.")
 
 
-def test_a_run_without_a_record_is_told(tmp_path: Path):
+def test_a_run_without_a_record_is_reported(tmp_path: Path):
     first = run(tmp_path / "a", [0.0, 1.0], {"mass.x": ("m", [0.0, 1.0])})
     second = run(tmp_path / "b", [0.0, 1.0], {"mass.x": ("m", [0.0, 1.0])})
     (second / "signals.parquet").unlink()

@@ -219,7 +219,7 @@ def test_what_is_no_run_is_refused(tmp_path: Path, wording: Wording):
         wording.check(output)
 
 
-def test_without_a_browser_the_way_to_one_is_told(grasp: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_without_a_browser_the_way_to_one_is_reported(grasp: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("PLAYWRIGHT_BROWSERS_PATH", str(tmp_path / "none"))
     monkeypatch.setattr("handover.scenarios.pages.film.browser._NAMES", ("no-such-browser",))
     status, told = film(grasp, "--out", tmp_path / "x.mp4")

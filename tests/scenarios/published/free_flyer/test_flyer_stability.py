@@ -36,7 +36,7 @@ def test_runs_that_differ_from_the_poles_are_noticed(late: float, verdict: Verdi
     assert claim.verdict is verdict, claim.measured
 
 
-def test_runs_that_diverge_until_a_unit_fails_count_as_not_at_rest_and_those_near_the_circle_are_told():
+def test_runs_that_diverge_until_a_unit_fails_count_as_not_at_rest_and_those_near_the_circle_are_reported():
     rows = table_of().rows
     diverged = [r for r in rows if r["settling_time"] is None]
     ended_so = made_table({**r, "status": "failed"} if r["settling_time"] is None else r for r in rows)

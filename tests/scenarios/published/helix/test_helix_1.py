@@ -134,7 +134,7 @@ def test_a_mean_time_is_compared_with_the_published_one_and_its_spread(mean: flo
     assert claim.interval[0] < mean < claim.interval[1]
 
 
-def test_two_runs_are_too_few_for_a_mean_and_an_error_that_can_stall_at_the_threshold_is_told():
+def test_two_runs_are_too_few_for_a_mean_and_an_error_that_can_stall_at_the_threshold_is_reported():
     table = table_of(times(a04=[20.0, 25.0]))
     assert judged(table, "At step size 0.4").verdict is Verdict.NOT_COMPARABLE
     stalls = [alpha for alpha in PUBLISHED if "50 mm, the threshold" in judged(table, f"At step size {alpha}").reason]

@@ -172,7 +172,7 @@ def test_ends_that_differ_by_more_than_their_reading_are_not_alike(last: float, 
     assert one(claims, "very similar").verdict is verdict
 
 
-def test_an_estimate_at_the_bound_but_for_one_step_is_told_with_that_step():
+def test_an_estimate_at_the_bound_but_for_one_step_is_reported_with_that_step():
     at = np.full(12, 0.005)
     assert judged(outward(0.14, pose_est=at), "The estimate is always").verdict is Verdict.REPRODUCED
     but_one = np.where(np.arange(12) == 1, 0.004, at)

@@ -41,7 +41,7 @@ def test_claims_are_about_success_and_exactness(missed: int, offset: float, hold
     assert [c.verdict is Verdict.REPRODUCED for c in HelixPlaces().claims(table_of(missed, offset))] == holds
 
 
-def test_each_failure_is_told_with_its_place_and_reason(tmp_path: Path, sketches: Sketches):
+def test_each_failure_is_reported_with_its_place_and_reason(tmp_path: Path, sketches: Sketches):
     (table,) = HelixPlaces().tables(table_of(3))
     assert len(table.rows) == 3
     assert "pushed the ball out of the hand (3)" in table.note

@@ -38,7 +38,7 @@ def test_the_whole_plan_has_every_sensor_material_and_tolerance():
     assert len(runs.of(*case(Finger.RING, incidence=0.4))) == 3
 
 
-def test_what_follows_from_the_scenes_own_assumptions_is_told_of_the_worst_and_has_no_verdict():
+def test_what_follows_from_the_scenes_own_assumptions_is_reported_of_the_worst_and_has_no_verdict():
     def off(run: PlannedRun) -> float:
         return -0.003 * (1.2 if run.parameters["finger"] == "thumb" else 0.9)
 
@@ -72,7 +72,7 @@ def test_one_curve_has_no_verdict_where_a_reflectivity_was_not_run():
     assert "1.5" in claim.reason
 
 
-def test_a_distance_that_most_runs_do_not_see_is_told_as_not_seen():
+def test_a_distance_that_most_runs_do_not_see_is_reported_as_not_seen():
     def unseen(run: PlannedRun) -> float | None:
         return None if run.parameters["reflectivity"] == "0.2" and run.parameters["finger"] != "ring" else 0.06
 

@@ -153,7 +153,7 @@ def test_tables_put_ours_beside_the_published_and_star_what_differs(table: Campa
     wording.check(text_of(IrTable().tables(table)))
 
 
-def test_a_distance_beyond_the_range_is_told_as_not_seen_and_runs_that_did_not_come_to_their_end_do_not_count():
+def test_a_distance_beyond_the_range_is_reported_as_not_seen_and_runs_that_did_not_come_to_their_end_do_not_count():
     def seen(run: PlannedRun) -> float:
         return nan if run.parameters["thing"] != "cylinder" or run.repetition < 6 else 0.04
 

@@ -89,7 +89,7 @@ def test_claims_are_judged_both_ways():
     assert {bad[name].verdict for name in judged} == {Verdict.NOT_REPRODUCED}
 
 
-def test_the_claim_against_the_rigid_arm_gets_no_verdict_and_is_told_where_it_falls():
+def test_the_claim_against_the_rigid_arm_gets_no_verdict_and_is_reported_where_it_falls():
     claims = claims_of(table_of())
     assert claims[AGAINST_RIGID].verdict is Verdict.NOT_COMPARABLE
     assert "depends on that" in claims[AGAINST_RIGID].reason

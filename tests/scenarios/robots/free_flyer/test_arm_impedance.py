@@ -43,7 +43,7 @@ def test_joints_that_lock_unknown_to_the_controller_depart_from_the_model(tmp_pa
 
 
 @pytest.mark.slow
-def test_a_joint_at_its_end_stop_is_told(tmp_path: Path):
+def test_a_joint_at_its_end_stop_is_reported(tmp_path: Path):
     ended = run(FlyerArmImpedance, tmp_path / "r", "posture=1.5,1.5,1.5", "joints=3", stop=2.5)
     assert "joint 1 was held at 90°" in ended.outcome.reason
     assert "of which 7 mm and 1.1° at most agree" in ended.outcome.reason
@@ -76,6 +76,6 @@ def test_factors_of_the_arm_scale_its_links():
     np.testing.assert_allclose(model["mass_L"], 0.7 * robot["mass_L"])
 
 
-def test_a_nozzle_that_is_stuck_is_told(tmp_path: Path):
+def test_a_nozzle_that_is_stuck_is_reported(tmp_path: Path):
     ended = run(FlyerArmImpedance, tmp_path / "r", "propulsion=nozzles", "stuck_nozzle=3", stop=0.1)
     assert "; nozzle 3 was stuck closed" in ended.outcome.reason

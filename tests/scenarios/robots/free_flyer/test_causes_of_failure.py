@@ -65,7 +65,7 @@ LED: tuple[tuple[dict[str, Any], str, float | None, Cause], ...] = (
 """What is known of a hand that is led, what it was to do, when its track ended, and why it did not."""
 
 
-def test_a_hand_that_is_led_and_did_not_answer_or_opened_too_soon_is_told(wording: Wording):
+def test_a_hand_that_is_led_and_did_not_answer_or_opened_too_soon_is_reported(wording: Wording):
     for known, touch, ended, cause in LED:
         found, why = PersonsDeeds(led=True, **known).untouched(touch, 21.0, ended)
         assert found is cause

@@ -159,7 +159,7 @@ def test_a_controller_of_joints_is_refused_where_there_are_none(wording: Wording
     wording.check(refused.value)
 
 
-def test_limits_of_a_controllers_own_are_told_where_thrust_has_none():
+def test_limits_of_a_controllers_own_are_reported_where_thrust_has_none():
     assert with_controller("AdmittanceController", propulsion=Propulsion.LIMITED).notes == []
     (note,) = with_controller("AdmittanceController", propulsion=Propulsion.IDEAL).notes
     assert "clips its own commands at impedance.f_max" in note
@@ -202,7 +202,7 @@ def test_controllers_expect_the_flappers_lag_of_nozzles():
 
 
 @pytest.mark.slow
-def test_a_push_is_borne_by_nozzles_and_a_stuck_one_is_told(tmp_path: Path):
+def test_a_push_is_borne_by_nozzles_and_a_stuck_one_is_reported(tmp_path: Path):
     small = ("propulsion=nozzles", "force=0.3", "patience=10")
     whole = run(FlyerImpedance, tmp_path / "whole", *small)
     assert metric(whole, "greatest_orientation_error") < 0.03
@@ -230,7 +230,7 @@ ASSUMED = "what its controllers assumed"
         (("navigation.delay=0.008",), "the robot's thrust followed its state 8 ms late, of which impedance knew 0 ms"),
     ],
 )
-def test_what_the_controllers_do_not_know_is_told_by_the_values_that_the_units_got(
+def test_what_the_controllers_do_not_know_is_reported_by_the_values_that_the_units_got(
     given: tuple[str, ...], told: str, tmp_path: Path
 ):
     assert model_mismatch(system_of(tmp_path, *given).units) == (f"; {told}" if told else "")

@@ -185,7 +185,7 @@ def test_a_run_out_of_time_says_why_by_what_was_so_at_its_end(wording: Wording):
         wording.check(follow((0.0, waiting), (until, waiting)).outcome().reason)
 
 
-def test_a_ball_that_the_person_brought_is_told(wording: Wording):
+def test_a_ball_that_the_person_brought_is_reported(wording: Wording):
     course = ((8.0, signals(Phase.GRASP, beside=0.071)), (20.0, signals(Phase.HOLD, Holder.GRIPPER)))
     for parameters in (Parameters(help_speed=0.05), Parameters()):
         outcome = follow(*course, parameters=parameters).outcome()

@@ -68,7 +68,7 @@ def test_the_reach_is_the_distance_up_to_which_all_places_are_reached():
 
 
 @pytest.mark.parametrize(("off", "verdict"), [(0.0, Verdict.REPRODUCED), (0.03, Verdict.NOT_REPRODUCED)])
-def test_a_reach_that_is_no_longer_the_one_found_is_told(off: float, verdict: Verdict):
+def test_a_reach_that_is_no_longer_the_one_found_is_reported(off: float, verdict: Verdict):
     rows = [
         {"azimuth": a, "height": z, "radius": r, "success": r <= reach(z) + off + 1e-9, "status": "done"}
         for a, z, r in product(AZIMUTHS, HEIGHTS, RADII)

@@ -27,7 +27,7 @@ def test_training_from_saved_points_gives_the_same_bytes(trained: Trained, tmp_p
 
 
 @pytest.mark.parametrize("learned", [["--learned", "physics"], ["--friction-compensation"]], ids=" ".join)
-def test_what_was_learned_is_told(learned: list[str], tmp_path: Path):
+def test_what_was_learned_is_reported(learned: list[str], tmp_path: Path):
     write_data(tmp_path / "d.parquet", made_up(240))
     done = call("--data", tmp_path / "d.parquet", *learned, "--out", tmp_path / "a.json")
     assert done.exit_code == 0, done.output

@@ -139,7 +139,7 @@ def test_entries_of_an_array_are_columns(tmp_path: Path):
     assert last.tolist() == pytest.approx([1.0, 8.0, 9.0])
 
 
-def test_an_input_has_a_start_value_or_a_column_and_a_late_table_is_told(tmp_path: Path):
+def test_an_input_has_a_start_value_or_a_column_and_a_late_table_is_reported(tmp_path: Path):
     mass, inputs = native_fmu("mass", 3), table(tmp_path, "time,f\n7,0\n8,2\n")
     for command in (("run", mass, "-p", "f=3"), ("sweep", mass, "f=1,2"), ("sweep", mass, "m=1,2", "-p", "f=3")):
         assert "f: the table of inputs gives it" in refusal(*command, "--input", inputs)

@@ -97,7 +97,7 @@ def test_so_it_does_where_a_unit_closes_all_descriptors(
         ("crash_in_unload", "unit bad crashed in unloading of its library at t = 1 s"),
     ],
 )
-def test_what_fails_as_units_are_loaded_or_ended_is_told_with_call_and_time(bad: str, text: str, tmp_path: Path):
+def test_what_fails_as_units_are_loaded_or_ended_is_reported_with_call_and_time(bad: str, text: str, tmp_path: Path):
     going = start(tmp_path, failing_ssp(tmp_path, bad), "--out", "r", "--call-limit", "0.5", "--no-report")
     status, _, errors = going.wait()
     assert status == 3, errors
@@ -112,7 +112,7 @@ def test_what_fails_as_units_are_loaded_or_ended_is_told_with_call_and_time(bad:
         assert not (tmp_path / "r" / "report.html").exists()
 
 
-def test_a_thread_of_a_unit_that_crashes_is_told_with_the_unit(tmp_path: Path):
+def test_a_thread_of_a_unit_that_crashes_is_reported_with_the_unit(tmp_path: Path):
     file = failing_ssp(tmp_path, "start_crashing_thread_in_step")
     status, _, errors = start(tmp_path, file, "--out", "r", "--pace", "1", "--no-report").wait()
     assert status == 3, errors

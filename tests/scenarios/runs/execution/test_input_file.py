@@ -71,7 +71,7 @@ def test_each_kind_is_read_and_entries_without_a_column_keep_their_start(tmp_pat
     ],
     ids=repr,
 )
-def test_what_is_no_table_or_does_not_fit_an_input_is_told(tmp_path: Path, text: str, wording: Wording):
+def test_what_is_no_table_or_does_not_fit_an_input_is_reported(tmp_path: Path, text: str, wording: Wording):
     table = tmp_path / "inputs.csv"
     table.write_text(text)
     with pytest.raises(UsageError) as raised:
@@ -91,7 +91,7 @@ def test_a_start_value_that_the_table_replaces_is_a_fault(tmp_path: Path):
 @pytest.mark.parametrize(
     ("times", "lines"), [((0, 1), 0), ((5, 6), 1), ((2, 3), 1), ((-3, -2), 1), ((-3, 0), 1), ((-3, 9), 0), ((7,), 0)]
 )
-def test_a_table_none_of_whose_times_are_in_the_run_is_told(tmp_path: Path, times: Sequence[float], lines: int):
+def test_a_table_none_of_whose_times_are_in_the_run_is_reported(tmp_path: Path, times: Sequence[float], lines: int):
     table = tmp_path / "inputs.csv"
     table.write_text("time,x\n" + "".join(f"{t},1\n" for t in times))
     assert len(read_inputs(table, INPUTS, {}).notes(0.0, 2.0)) == lines

@@ -48,7 +48,7 @@ def test_pictures_of_an_earlier_end_do_not_stay(tmp_path: Path):
     assert read_picture_files(tmp_path / "pictures") == []
 
 
-def test_a_damaged_list_and_a_picture_that_is_gone_are_told(tmp_path: Path, wording: Wording):
+def test_a_damaged_list_and_a_picture_that_is_gone_are_reported(tmp_path: Path, wording: Wording):
     write_picture_files(tmp_path / "pictures", [taken("start")])
     (tmp_path / "pictures" / "01_start_left.jpg").unlink()
     for content in (None, "[{]", '[{"t": 0.0}]', "[1]", '{"a": 1}'):

@@ -166,7 +166,7 @@ def test_a_void_round_is_played_again_with_its_reason_and_at_last_kept_as_void(t
     assert session.answers == {}
 
 
-def test_why_a_round_is_void_is_told_in_every_language_and_the_end_of_the_practice_once(tmp_path: Path):
+def test_why_a_round_is_void_is_reported_in_every_language_and_the_end_of_the_practice_once(tmp_path: Path):
     protocol = practised(tmp_path / "study")
     assert protocol.content()["practice_over"]
     protocol.act("begin")

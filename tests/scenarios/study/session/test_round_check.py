@@ -71,7 +71,9 @@ def test_a_round_is_the_same_byte_for_byte_when_carried_out_again(played: Path):
     assert "other versions" not in done.output
 
 
-def test_a_changed_record_and_other_versions_are_told(played: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_changed_record_and_other_versions_are_reported(
+    played: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
     out = shutil.copytree(played, tmp_path / "out")
     folder = StudyFolder.read(out).session(1).run_folder(1)
     sound = shutil.copytree(folder, tmp_path / "sound")

@@ -32,7 +32,7 @@ def test_a_trial_that_cannot_begin_leaves_no_files(tmp_path: Path, monkeypatch: 
 
 
 @pytest.mark.slow
-def test_a_scene_that_fails_is_told_with_the_reason(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_scene_that_fails_is_reported_with_the_reason(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "dark_scene.py").write_text(DARK, encoding="utf-8")
     trial = Trial(TrialRequest("dark_scene:Dark", [], 0, tmp_path / "out", {}))
