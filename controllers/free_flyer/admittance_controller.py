@@ -42,6 +42,8 @@ from handover.cosim.blocks.ports import Floats, Vector3, output, parameter
 from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.units import Newton, NewtonMetre, Number, PerSecond, PerSecond2
 
+__all__ = ["AdmittanceController", "Behaviour", "Inputs", "InvalidControllerParameters", "Outputs", "Params"]
+
 
 class VirtualBody:
     """k_M x'' + k_B x' + k_D x = F, the admittance of second order of eq. (2.17), sampled exactly with F held.
@@ -67,7 +69,7 @@ class VirtualBody:
         return self._A @ state + self._B @ wrench
 
 
-def admittance_law(
+def _admittance_law(
     body: FlyerBody,
     virtual: VirtualBody,
     observer: WrenchObserver,
@@ -103,7 +105,6 @@ _INNER_LOOP = assumed(
     "tracks a step of the virtual body's force in half a second, and leaves two thirds of the weakest thrust to it"
 )
 
-__all__ = ["AdmittanceController", "Behaviour", "Inputs", "InvalidControllerParameters", "Outputs", "Params"]
 
 _NAME = "AdmittanceController"
 
@@ -160,7 +161,7 @@ class Params(impedance_controller.Params, LimitParams):
     def law(self, factor: float, delay: float, T: float) -> LinearController:
         """Return the law near the goal at a period T, with inner gains and observer rate times a factor."""
         observer, thrust = WrenchObserver(factor * self.observer_rate, T), ThrustModel(self.lag, delay, T)
-        return admittance_law(self.body(), self.virtual_body(T), observer, thrust, *self.inner_gains(factor), T)
+        return _admittance_law(self.body(), self.virtual_body(T), observer, thrust, *self.inner_gains(factor), T)
 
     def faults(self, period: float) -> list[str]:
         """Return what is wrong with body, gains and the loop that is closed at a period, s."""

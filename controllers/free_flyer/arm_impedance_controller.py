@@ -35,7 +35,7 @@ from handover.cosim.blocks.units import (
 
 
 @dataclass(frozen=True, kw_only=True)
-class NullMotion:
+class _NullMotion:
     """How the joints go back to their posture while the gripper stays: frequency, rad/s, and damping ratio."""
 
     frequency: float
@@ -46,10 +46,10 @@ class NullMotion:
         """Damping over inertia, 1/s."""
         return 2.0 * self.damping_ratio * self.frequency
 
-    def scaled(self, factor: float) -> "NullMotion":
+    def scaled(self, factor: float) -> "_NullMotion":
         """Return spring and damper times a factor."""
         root = factor**0.5
-        return NullMotion(frequency=root * self.frequency, damping_ratio=root * self.damping_ratio)
+        return _NullMotion(frequency=root * self.frequency, damping_ratio=root * self.damping_ratio)
 
 
 class ArmAtRest:
@@ -91,7 +91,7 @@ class ArmAtRest:
             C=np.hstack([C, np.zeros((2 * n, 6))]),
         )
 
-    def law(self, gains: ImpedanceGains, null: NullMotion) -> LinearController:
+    def law(self, gains: ImpedanceGains, null: _NullMotion) -> LinearController:
         """Return the law of `ArmImpedanceController` near rest: commanded forces from displacement and its rate."""
         J, B, Z, n = self.J, self.B, self.space.Z, len(self.B)
         K, D = (_in_axes(self.R_BG, gain) for gain in (gains.stiffness(), gains.damping()))
@@ -264,9 +264,9 @@ class Params(GainParams):
         gains = published_gains(self.behaviour, replace(whole, I_B=(seen + np.transpose(seen)) / 2.0))
         return replace(gains, damping_rotation=self.rotational_damping * np.eye(3))
 
-    def null(self) -> NullMotion:
+    def null(self) -> _NullMotion:
         """Return how the joints go back to their posture."""
-        return NullMotion(frequency=self.null_frequency, damping_ratio=self.null_damping)
+        return _NullMotion(frequency=self.null_frequency, damping_ratio=self.null_damping)
 
 
 @dataclass(kw_only=True)

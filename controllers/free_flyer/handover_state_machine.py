@@ -33,6 +33,18 @@ from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.terminals import Terminal, TerminalKind, terminal
 from handover.cosim.blocks.units import Metre, MetrePerSecond, Number, Radian, RadianPerSecond
 
+__all__ = [
+    "HandoverPhase",
+    "HandoverStateMachine",
+    "HandoverTask",
+    "Inputs",
+    "InvalidHandoverParameters",
+    "Outputs",
+    "Params",
+    "Pose",
+    "gripper_motion",
+]
+
 
 class HandoverPhase(enum.IntEnum):
     """States of figure 3.1, its two ends, and what the thesis has not: a look whether what was released is gone."""
@@ -81,19 +93,6 @@ class Outputs:
         "times that what it had released was still between the fingers, or what it had not was gone", minimum=0.0
     )
     speed_G: MetrePerSecond = output("speed of the gripper, low-passed, as it is monitored", minimum=0.0)
-
-
-__all__ = [
-    "HandoverPhase",
-    "HandoverStateMachine",
-    "HandoverTask",
-    "Inputs",
-    "InvalidHandoverParameters",
-    "Outputs",
-    "Params",
-    "Pose",
-    "gripper_motion",
-]
 
 
 Pose = tuple[Vector, Quaternion]

@@ -55,6 +55,8 @@ from handover.cosim.blocks.units import (
     RadianPerSecond2,
 )
 
+__all__ = ["Inputs", "InvalidControllerParameters", "Outputs", "Params", "PoseController"]
+
 _PEAK_SPEED = 1.875  # of s(x) = 10 x^3 - 15 x^4 + 6 x^5, from 0 to 1 in unit time
 _PEAK_ACCELERATION = 10.0 / math.sqrt(3.0)
 _PEAK_BRAKING = 3.94  # of h(x) = x - 6 x^3 + 8 x^4 - 3 x^5, which begins with unit speed and ends where it began
@@ -145,9 +147,8 @@ def profile_between(p_0: Vector, v_0: Vector, q_0: Quaternion, p_1: Vector, q_1:
 
 
 _PUBLIC = stated("Astrobee's public software")
-_BOUNDS = assumed("not given: bounds of the way that leave thrust for control")
+_ASSUMED_BOUNDS = assumed("not given: bounds of the way that leave thrust for control")
 
-__all__ = ["Inputs", "InvalidControllerParameters", "Outputs", "Params", "PoseController"]
 
 _NAME = "PoseController"
 
@@ -169,16 +170,20 @@ class Params(RobotParams, LimitParams):
     )
     k_D_R: PerSecond = parameter(3.2, "angular acceleration per rate error", minimum=0.0, maximum=1e4, origin=_PUBLIC)
     speed: MetrePerSecond = parameter(
-        0.1, "largest speed of the trajectory (assumed)", minimum=1e-3, maximum=10.0, origin=_BOUNDS
+        0.1, "largest speed of the trajectory (assumed)", minimum=1e-3, maximum=10.0, origin=_ASSUMED_BOUNDS
     )
     acceleration: MetrePerSecond2 = parameter(
-        0.02, "largest acceleration of the trajectory (assumed)", minimum=1e-4, maximum=100.0, origin=_BOUNDS
+        0.02, "largest acceleration of the trajectory (assumed)", minimum=1e-4, maximum=100.0, origin=_ASSUMED_BOUNDS
     )
     rate: RadianPerSecond = parameter(
-        0.17, "largest turning rate of the trajectory (assumed)", minimum=1e-3, maximum=10.0, origin=_BOUNDS
+        0.17, "largest turning rate of the trajectory (assumed)", minimum=1e-3, maximum=10.0, origin=_ASSUMED_BOUNDS
     )
     turning: RadianPerSecond2 = parameter(
-        0.1, "largest angular acceleration of the trajectory (assumed)", minimum=1e-4, maximum=100.0, origin=_BOUNDS
+        0.1,
+        "largest angular acceleration of the trajectory (assumed)",
+        minimum=1e-4,
+        maximum=100.0,
+        origin=_ASSUMED_BOUNDS,
     )
 
     def position_gains(self) -> PidGains:

@@ -24,6 +24,19 @@ from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.terminals import Terminal, TerminalKind, terminal
 from handover.cosim.blocks.units import Metre, Newton, Number, Radian, SquareMetre, Tick
 
+__all__ = [
+    "Inputs",
+    "InvalidReading",
+    "InvalidReflexParameters",
+    "IrReflex",
+    "Outputs",
+    "Params",
+    "Phase",
+    "Stop",
+    "Strategy",
+    "Visibility",
+]
+
 
 class Phase(enum.IntEnum):
     """What the hand is doing; CHECK to STEP are the steps 3 to 9 of algorithm 1, SEARCH and TRACK are on the move."""
@@ -67,7 +80,7 @@ class Stop(enum.IntEnum):
 
 
 STOPS = {Verdict.REACHED: Stop.THRESHOLD, Verdict.STALLED: Stop.STALLED, Verdict.USED_UP: Stop.PATIENCE}
-TERMINATIONS = {
+_TERMINATIONS = {
     Termination.REACHED: Stop.THRESHOLD,
     Termination.SETTLED: Stop.STALLED,
     Termination.LOST: Stop.OUT_OF_SIGHT,
@@ -79,19 +92,6 @@ TERMINATIONS = {
 }
 PHASES = {Mode.SEARCH: Phase.SEARCH, Mode.ONE_SIDED: Phase.RECOVER, Mode.TRACK: Phase.TRACK}
 
-
-__all__ = [
-    "Inputs",
-    "InvalidReading",
-    "InvalidReflexParameters",
-    "IrReflex",
-    "Outputs",
-    "Params",
-    "Phase",
-    "Stop",
-    "Strategy",
-    "Visibility",
-]
 
 _PERIOD = Fraction(3, 200)  # one round of the three sensors, at 5 ms each (assumed)
 _BRAKING = 0.008  # m; before the slow part of the way to the pre-grasp pose (assumed)
@@ -284,7 +284,7 @@ class IrReflex:
         self._phase = PHASES[following.mode]
         self._move.goal = goal
         if ending is not Termination.NONE:
-            self._close(TERMINATIONS[ending])
+            self._close(_TERMINATIONS[ending])
 
     def _arriving(self, x: X) -> X:
         """Return the command on the way to the pre-grasp pose: slow on its last part, where an object may stand."""

@@ -22,7 +22,7 @@ from handover.cosim.fmu.unit_warnings import UnitWarnings
 from handover.cosim.isolation.unit_process import NoUnitProcess, UnitProcess
 
 
-class InstanceProcess:
+class _InstanceProcess:
     """The process of an instance.
 
     Inputs of an isolated instance are set, and its outputs read, together with the step: a failure may have arisen in
@@ -156,7 +156,7 @@ class CheckedCalls:
         self._failed: int | None = None
         self._warnings = UnitWarnings()
         d = description
-        self._process = InstanceProcess(name, d.path, self._heartbeat, isolated=isolated)
+        self._process = _InstanceProcess(name, d.path, self._heartbeat, isolated=isolated)
         try:
             self._fmu = self._load(folder)
         except InvalidFmu as e:

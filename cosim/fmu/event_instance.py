@@ -31,7 +31,7 @@ class Qualifier(enum.IntEnum):
     CHANGED = 2
 
 
-class ClockCalls:
+class _ClockCalls:
     """Activates an instance's input clocks, and reads its output clocks, intervals and shifts."""
 
     def __init__(self, call: Call, clocks: Mapping[str, FmuClock]) -> None:
@@ -85,7 +85,7 @@ class ClockCalls:
         self._call(function, ctypes.byref(reference), 1, *(ctypes.byref(r) for r in results))
 
 
-class ClockTimer:
+class _ClockTimer:
     """The times of a time-based input clock.
 
     Periodic clocks (constant, fixed, tunable) tick at start + shift + k * interval; the interval is the description's,
@@ -97,7 +97,7 @@ class ClockTimer:
         next: the time of the next tick, s; None while a countdown has not begun.
     """
 
-    def __init__(self, clock: FmuClock, calls: ClockCalls, start: Fraction) -> None:
+    def __init__(self, clock: FmuClock, calls: _ClockCalls, start: Fraction) -> None:
         """Read from the unit, in initialisation mode of a run from `start` on, what the description leaves open."""
         self.clock = clock
         self._calls = calls
@@ -161,14 +161,14 @@ class EventInstance(Instance):
         super().__init__(name, description, folder, fed, heartbeat, isolated=isolated)
         self.in_event_mode = False
         self.active: set[str] = set()
-        self.timers: list[ClockTimer] = []
+        self.timers: list[_ClockTimer] = []
         self.next_event: float | None = None
         self._fed = [description.inputs[i] for i in fed]
         self._outputs = list(description.outputs.values())
         self._initialized = False
         self._last_set: dict[str, bytes] = {}  # by input, the value given last; none where its clock has begun to tick
         self._parts: dict[tuple[str, tuple[str, ...]], list[SignalBuffer]] = {}
-        self._clock_calls = ClockCalls(self._call, description.clocks)
+        self._clock_calls = _ClockCalls(self._call, description.clocks)
         self._flags = [ctypes.c_bool() for _ in range(5)]
         self._next = ctypes.c_double()
 
@@ -180,7 +180,7 @@ class EventInstance(Instance):
         """
         timed = [c for c in self.description.clocks.values() if c.is_input and not c.is_triggered]
         try:
-            self.timers = [ClockTimer(c, self._clock_calls, exact_seconds(self.time)) for c in timed]
+            self.timers = [_ClockTimer(c, self._clock_calls, exact_seconds(self.time)) for c in timed]
         except ValueError as e:
             raise UnitFailure(self.name, "fmi3ExitInitializationMode", self.time, str(e), tuple(self.log)) from e
         super().exit_initialization()

@@ -26,7 +26,7 @@ T = TypeVar("T", bound=Hashable)
 Needs = Mapping[T, Collection[T]]
 """The items that each item needs; needed items that are no keys are ignored."""
 
-DescribeWait = Callable[[T, set[T]], None]
+_DescribeWait = Callable[[T, set[T]], None]
 """Called for an item that is placed before others that it needs, with those others."""
 
 
@@ -68,7 +68,9 @@ def strongly_connected(needs: Needs[T]) -> list[list[T]]:
     return list(members.values())
 
 
-def ordered(firm: Needs[T], soft: Needs[T], describe_soft: DescribeWait[T], describe_firm: DescribeWait[T]) -> list[T]:
+def ordered(
+    firm: Needs[T], soft: Needs[T], describe_soft: _DescribeWait[T], describe_firm: _DescribeWait[T]
+) -> list[T]:
     """Order the keys of `firm` so that each follows those that it needs; otherwise in the order given.
 
     Where needs form a cycle, it is broken at a soft need if there is one, else at a firm need of a cycle that does not
@@ -284,8 +286,8 @@ def in_order(
     groups: Sequence[Group],
     firm: Needs[str],
     soft: Needs[str],
-    describe_soft: DescribeWait[int],
-    describe_firm: DescribeWait[int],
+    describe_soft: _DescribeWait[int],
+    describe_firm: _DescribeWait[int],
 ) -> list[Group]:
     """Order groups by the needs of their units, see `ordered`; the callbacks get groups by their index."""
     group_of = {name: i for i, group in enumerate(groups) for name in group.units}

@@ -302,7 +302,7 @@ def flag(name: str, value: Any) -> bool:
 
 
 def formats_of(formats: Sequence[str]) -> tuple[str, ...]:
-    """Return formats of a record.
+    """Return formats of a record, each once.
 
     Raises:
         InvalidInput: one is unknown.

@@ -35,7 +35,7 @@ from handover.scenarios.runs.campaign.folder import CampaignFolder, default_fold
 from handover.scenarios.runs.campaign.grid import parse_grid, set_parameters, split_units, vary_units
 from handover.scenarios.runs.campaign.plan import MAX_RUNS, CampaignPlan
 from handover.scenarios.runs.campaign.plan_check import prepared
-from handover.scenarios.runs.campaign.pool_config import LazyPool, PoolConfig
+from handover.scenarios.runs.campaign.pools import LazyPool, PoolConfig
 from handover.scenarios.runs.campaign.worker_pool import RunCounts
 from handover.scenarios.runs.execution.errors import require_extra
 from handover.scenarios.runs.execution.file_experiment import settable_of

@@ -24,7 +24,7 @@ from handover.scenarios.runs.campaign.campaign import run_campaign
 from handover.scenarios.runs.campaign.folder import CampaignFolder, default_folder
 from handover.scenarios.runs.campaign.plan import CampaignPlan
 from handover.scenarios.runs.campaign.plan_check import PreparedPlan, prepared
-from handover.scenarios.runs.campaign.pool_config import LazyPool, PoolConfig
+from handover.scenarios.runs.campaign.pools import LazyPool, PoolConfig
 from handover.scenarios.runs.campaign.table import CampaignTable
 from handover.scenarios.runs.campaign.worker_pool import RunCounts, WorkerPool
 from handover.scenarios.runs.execution.errors import (

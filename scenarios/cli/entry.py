@@ -40,29 +40,30 @@ class _Terminal(io.FileIO):
     The system ends a run by SIGHUP then, after its step, with record and report.
     """
 
-    def write(self, text: Any, /) -> int:
+    def write(self, data: Any, /) -> int:
         try:
-            return super().write(text)
+            return super().write(data)
         except OSError as e:
             if e.errno != errno.EIO:
                 raise
-            return len(text)
+            return len(data)
 
 
-def outlive_terminals() -> None:
+def drop_output_to_closed_terminals() -> None:
     """Let what this process prints on a terminal be dropped once that was closed, in place of an error."""
     if sys.platform == "win32":
         return
     for number, name in ((1, "stdout"), (2, "stderr")):
         stream = getattr(sys, name)
         if stream.isatty():
-            setattr(sys, name, terminal_stream(number, stream.encoding, stream.errors))
+            setattr(sys, name, terminal_stream(number, stream))
 
 
-def terminal_stream(number: int, encoding: str, errors: str) -> io.TextIOWrapper:
-    """Return a stream that writes lines to a terminal, open under a number, for as long as somebody reads them."""
+def terminal_stream(number: int, like: io.TextIOWrapper) -> io.TextIOWrapper:
+    """Return a stream, like another one, that writes to a terminal, open under a number, as long as somebody reads."""
     terminal = io.BufferedWriter(_Terminal(number, "w", closefd=False))
-    return io.TextIOWrapper(terminal, encoding, errors, line_buffering=True)
+    options: dict[str, Any] = {"line_buffering": True, "write_through": like.write_through}
+    return io.TextIOWrapper(terminal, like.encoding, like.errors, **options)
 
 
 def main() -> None:
@@ -70,7 +71,7 @@ def main() -> None:
     sys.path[:] = import_path()
     ImportedElsewhere.install()
     open_standard_streams()
-    outlive_terminals()
+    drop_output_to_closed_terminals()
     try:
         if sys.argv[1:2] and sys.argv[1] in _SUPERVISED:
             from handover.scenarios.runs.execution.supervisor import can_supervise, run_to_end, supervise

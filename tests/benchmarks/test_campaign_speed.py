@@ -20,7 +20,7 @@ from pytest_benchmark.fixture import BenchmarkFixture
 from handover.cosim.stepping.options import MasterOptions
 from handover.fmus.build import cached
 from handover.scenarios.catalog import SCENARIOS
-from handover.scenarios.runs.campaign.pool_config import LocalPool
+from handover.scenarios.runs.campaign.pools import LocalPool
 from handover.scenarios.runs.campaign.worker_pool import RunJob, WorkerPool
 
 RUNS, ROUNDS = 10, 3

@@ -6,7 +6,7 @@ import shutil
 from collections.abc import Callable, Generator, Sequence
 from pathlib import Path
 
-from handover.scenarios.runs.campaign import pool_config
+from handover.scenarios.runs.campaign import pools
 from handover.scenarios.runs.campaign.run_job import run_job
 from handover.scenarios.runs.campaign.worker_pool import JobResult, RunJob
 
@@ -48,4 +48,4 @@ def _run(job: RunJob) -> None:
 
 def use_in_process_pool() -> None:
     """Let this process execute campaigns' runs itself; `before` of a `Command`."""
-    pool_config.LocalPool = InProcessPool.opened  # type: ignore
+    pools.LocalPool = InProcessPool.opened  # type: ignore

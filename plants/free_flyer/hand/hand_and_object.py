@@ -55,6 +55,19 @@ from handover.plants.free_flyer.hand.person import Activity, FlyerPerson
 from handover.plants.free_flyer.hand.sight import Perception
 from handover.plants.hand_motion import minimum_jerk
 
+__all__ = [
+    "Activity",
+    "Driver",
+    "HandAndObject",
+    "Holder",
+    "Inputs",
+    "InvalidHandParameters",
+    "Motion",
+    "Outputs",
+    "Params",
+    "StartHolder",
+]
+
 
 class Holder(enum.IntEnum):
     """Who holds the object."""
@@ -102,20 +115,6 @@ class Outputs:
     q_WH_goal: Vector4[Number] = output("orientation in which they want it")
     finger_goal: Vector14[Radian] = output("angles to which they want the joints")
     closed_goal: bool = output("they want the hand to grasp")
-
-
-__all__ = [
-    "Activity",
-    "Driver",
-    "HandAndObject",
-    "Holder",
-    "Inputs",
-    "InvalidHandParameters",
-    "Motion",
-    "Outputs",
-    "Params",
-    "StartHolder",
-]
 
 
 _HOLDERS = {

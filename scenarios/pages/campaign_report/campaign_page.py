@@ -39,14 +39,14 @@ from handover.scenarios.runs.results.tables import format_value, options_in_word
 from handover.scenarios.runs.results.tolerated_faults import ToleratedFaults
 
 
-def setting_section(results: CampaignResults) -> Section:
+def _setting_section(results: CampaignResults) -> Section:
     """Return tables of what is set for all runs; other parameters have the scenario's defaults."""
     metadata = results.metadata
     options = options_in_words(metadata.get("master", {}))
     parts = [
-        _part("Fixed parameters", {n: _value(results, n, v) for n, v in metadata["fixed"].items()}),
-        _part("Master", {n: format_value(v) for n, v in options.items() if v is not None}),
-        _part("Versions", {n: str(v) for n, v in metadata.get("versions", {}).items()}),
+        _settings_table("Fixed parameters", {n: _setting_text(results, n, v) for n, v in metadata["fixed"].items()}),
+        _settings_table("Master", {n: format_value(v) for n, v in options.items() if v is not None}),
+        _settings_table("Versions", {n: str(v) for n, v in metadata.get("versions", {}).items()}),
         _fmus(metadata.get("units", {})),
     ]
     others = "Parameters that are neither varied nor fixed have"
@@ -57,7 +57,7 @@ def setting_section(results: CampaignResults) -> Section:
     return Section(anchor="setting", title="Setting", html=html)
 
 
-def _part(title: str, rows: Mapping[str, str]) -> Markup:
+def _settings_table(title: str, rows: Mapping[str, str]) -> Markup:
     if not rows:
         return Markup()
     return Markup("<div><h3>{}</h3>{}</div>").format(
@@ -79,22 +79,22 @@ def _fmus(units: Mapping[str, Mapping[str, str]]) -> Markup:
     return Markup("<div class='across'><h3>FMUs</h3>{}</div>").format(rows_table(("unit", "file", "sha256"), rows))
 
 
-def _value(results: CampaignResults, name: str, text: str) -> str:
+def _setting_text(results: CampaignResults, name: str, text: str) -> str:
     if results.is_number(name):
         return display_unit(results.unit(name), float(text)).text(float(text))
     unit = results.unit(name)
     return text if unit == "1" else f"{text} {unit}"
 
 
-def figures_section(figures: Sequence[Figure], folder: Path) -> Section | None:
+def _figures_section(figures: Sequence[Figure], folder: Path) -> Section | None:
     """Return figures with their captions, None if there are none; `folder` has them as PNG."""
     if not figures:
         return None
-    html = Markup("\n").join(_html(f, folder / f"{f.name}.png") for f in figures)
+    html = Markup("\n").join(_figure_html(f, folder / f"{f.name}.png") for f in figures)
     return Section(anchor="figures", title="Figures", html=html)
 
 
-def _html(figure: Figure, file: Path) -> Markup:
+def _figure_html(figure: Figure, file: Path) -> Markup:
     data = base64.b64encode(file.read_bytes()).decode()
     return Markup(
         "<figure><div class='scroll'><img class='paper' alt='{}' src='data:image/png;base64,{}'></div>"
@@ -104,14 +104,14 @@ def _html(figure: Figure, file: Path) -> Markup:
 
 _HEADER = ("claim", "published", "ours", "95 % interval", "verdict")
 _HEADER_BEYOND = tuple(name for name in _HEADER if name != "published")
-_COLOURS = {Verdict.REPRODUCED: "good", Verdict.NOT_REPRODUCED: "bad", Verdict.NOT_COMPARABLE: "soft"}
+_VERDICT_COLOURS = {Verdict.REPRODUCED: "good", Verdict.NOT_REPRODUCED: "bad", Verdict.NOT_COMPARABLE: "soft"}
 
 
-def claims_section(claims: Sequence[Claim]) -> Section | None:
+def _claims_section(claims: Sequence[Claim]) -> Section | None:
     """Return the table of claims with their verdicts, this project's own below; None if there are none."""
     parts: list[Markup] = []
     for beyond, title, header in ((False, "", _HEADER), (True, "Beyond the paper", _HEADER_BEYOND)):
-        rows = [_rows(c, header) for c in claims if c.beyond is beyond]
+        rows = [_claim_rows(c, header) for c in claims if c.beyond is beyond]
         if rows:
             heads = Markup().join(Markup("<th scope='col'>{}</th>").format(h) for h in header)
             heading = Markup("<h3>{}</h3>").format(title) if title else Markup()
@@ -120,14 +120,14 @@ def claims_section(claims: Sequence[Claim]) -> Section | None:
     return Section(anchor="claims", title="Claims", html=Markup("\n").join(parts)) if parts else None
 
 
-def verdict_html(verdict: Verdict, words: str) -> Markup:
+def _verdict_html(verdict: Verdict, words: str) -> Markup:
     """Return the words of a verdict in its colour."""
-    return Markup("<b class='{}'>{}</b>").format(_COLOURS[verdict], words)
+    return Markup("<b class='{}'>{}</b>").format(_VERDICT_COLOURS[verdict], words)
 
 
-def _rows(claim: Claim, header: Sequence[str]) -> Markup:
+def _claim_rows(claim: Claim, header: Sequence[str]) -> Markup:
     where = Markup("<br><span class='soft'>{}</span>").format(claim.where) if claim.where else Markup()
-    verdict = verdict_html(claim.verdict, claim.verdict_text)
+    verdict = _verdict_html(claim.verdict, claim.verdict_text)
     cells = {
         "claim": Markup("{}{}").format(claim.claim, where),
         "published": claim.published,
@@ -145,7 +145,7 @@ def _rows(claim: Claim, header: Sequence[str]) -> Markup:
     return Markup("<tr>{}</tr>").format(text) + why
 
 
-def comparison_section(tables: Sequence[ComparisonTable]) -> Section | None:
+def _comparison_section(tables: Sequence[ComparisonTable]) -> Section | None:
     """Return published values beside ours; None if there are none."""
     note = Markup("<p class='soft'>{}</p>")
     parts = [
@@ -168,7 +168,7 @@ def campaign_header(results: CampaignResults, claims: Sequence[Claim]) -> Markup
     for beyond, heading in ((False, "The paper's claims"), (True, "Beyond the paper")):
         counts = verdict_counts(claims, beyond)
         if counts:
-            verdicts = Markup(", ").join(Markup("{} {}").format(n, verdict_html(v, words)) for n, v, words in counts)
+            verdicts = Markup(", ").join(Markup("{} {}").format(n, _verdict_html(v, words)) for n, v, words in counts)
             lines.append(Markup("<p>{}: {}.</p>").format(heading, verdicts))
     lines.append(Markup("<p class='soft'>{}</p>").format(f"{_plan(results)} {_cost(results)}".strip()))
     return Markup("\n").join(lines)
@@ -301,7 +301,7 @@ def _write(
     """Write the page; a paper's figures are drawn into a folder, and its tables are made unless they are given."""
     experiment_type = EXPERIMENTS.get(str(results.metadata.get("experiment", "")))
     experiment = None if experiment_type is None else experiment_type()
-    sections: list[Section | None] = [claims_section(claims)]
+    sections: list[Section | None] = [_claims_section(claims)]
     if experiment is not None and results.points:
         with faults.tolerated("what the paper has published could not be shown"):
             sections += _published(experiment, tables, results, folder.runs, figures)
@@ -313,7 +313,7 @@ def _write(
         pairs_section(results),
         failures_section(results, folder.path),
         runs_section(results, folder.path),
-        setting_section(results),
+        _setting_section(results),
     ]
     title = results.scenario if experiment is None else f"{experiment.name}: {experiment.title}"
     write_page(file or folder.report, title, campaign_header(results, claims), [s for s in sections if s is not None])
@@ -333,4 +333,4 @@ def _published(
     except KeyError as e:
         html = Markup("<p>The campaign is of another version of {}, so this is left out: its runs have no {}.</p>")
         return [Section(anchor="comparison", title="Published and ours", html=html.format(experiment.name, e.args[0]))]
-    return [comparison_section(tables), figures_section(drawn, figures)]
+    return [_comparison_section(tables), _figures_section(drawn, figures)]

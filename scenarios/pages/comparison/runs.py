@@ -84,13 +84,15 @@ def _description(name: str, descriptions: Sequence[str]) -> str:
 
     Some add what is so in one run: in brackets, as "(sees nothing)", or, of a number that is a choice, after a colon.
     """
-    parts = [d.partition(": ") for d in descriptions]
-    if len({topic for topic, _, _ in parts}) == 1:
-        return "".join(parts[0][:2]) + "; ".join(dict.fromkeys(rest for *_, rest in parts))
     shortest = min(descriptions, key=len)
     if any(not d.startswith(shortest) for d in descriptions):
         shortest = re.sub(r" \([^()]*\)$", "", shortest)
-    return shortest if shortest and all(d.startswith(shortest) for d in descriptions) else name.replace("_", " ")
+    if shortest and all(d.startswith(shortest) for d in descriptions):
+        return shortest
+    topics, choices = zip(*(d.split(": ", 1) if ": " in d else (d, "") for d in descriptions), strict=True)
+    if len(set(topics)) == 1 and all(choices):
+        return f"{topics[0]}: {'; '.join(dict.fromkeys(choices))}"
+    return name.replace("_", " ")
 
 
 @dataclass(frozen=True)

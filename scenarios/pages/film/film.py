@@ -21,7 +21,7 @@ from handover.scenarios.pages.film.browser import open_camera, window_of
 from handover.scenarios.pages.film.film_page import FilmContent, NotFilmed, film_html, most_plots
 from handover.scenarios.runs.results.run_folder import disk_errors_reported, make_folder_of, unfinished_place
 
-CODECS: Mapping[str, Sequence[str]] = {
+_CODECS: Mapping[str, Sequence[str]] = {
     ".mp4": ("-c:v", "libx264", "-crf", "18", "-pix_fmt", "yuv420p", "-movflags", "+faststart", "-f", "mp4"),
     ".webm": ("-c:v", "libvpx-vp9", "-crf", "28", "-b:v", "0", "-row-mt", "1", "-cpu-used", "4",
               "-pix_fmt", "yuv420p", "-f", "webm"),
@@ -35,15 +35,15 @@ _AS_ON_SCREENS = (
 
 
 Film = Callable[[bytes], object]
-"""A film in the making: takes a frame, a PNG; raises BrokenPipeError where `film_to` then says why."""
+"""A film in the making: takes a frame, a PNG; raises BrokenPipeError where `_film_to` then says why."""
 
 
 @contextmanager
-def film_to(path: Path, fps: float, *, replace: bool) -> Generator[Film, None, None]:
+def _film_to(path: Path, fps: float, *, replace: bool) -> Generator[Film, None, None]:
     """Give what takes the frames of a film; it has its name when it is complete, and else it is not there.
 
     Args:
-        path: one that ends with one of the `CODECS`; it has the film in the end.
+        path: one that ends with one of the `_CODECS`; it has the film in the end.
         fps: frames per second.
         replace: whether a file of that name is replaced.
 
@@ -57,7 +57,7 @@ def film_to(path: Path, fps: float, *, replace: bool) -> Generator[Film, None, N
         try:
             look = () if suffix == ".gif" else _AS_ON_SCREENS
             frames = ("-f", "image2pipe", "-c:v", "png", "-framerate", f"{fps:.6g}", "-i", "-")
-            with _running(path, (*frames, *look, *CODECS[suffix], str(raw))) as film:
+            with _running(path, (*frames, *look, *_CODECS[suffix], str(raw))) as film:
                 yield film
             if suffix == ".gif":
                 _colour(path, raw, Path(folder) / "colours.png", unfinished)
@@ -165,7 +165,7 @@ def write_film(
 
     Args:
         content: what it shows.
-        path: see `film_to`.
+        path: see `_film_to`.
         settings: how it is filmed.
         report: is called with how many frames are done, and of how many.
         replace: whether a file of its name is replaced, when the film is complete.
@@ -181,7 +181,7 @@ def write_film(
     make_folder_of(path)
     with (
         open_camera(html, settings.size, dark=settings.dark) as camera,
-        film_to(path, settings.fps, replace=replace) as film,
+        _film_to(path, settings.fps, replace=replace) as film,
     ):
         for k, t in enumerate(times.tolist()):
             report(k, len(times))

@@ -52,7 +52,7 @@ _MAX_LENGTH = 60
 """Characters of a value that a message shows."""
 
 
-def identity_of(plan: CampaignPlan, fmus: Mapping[str, Path]) -> dict[str, Any]:
+def _identity_of(plan: CampaignPlan, fmus: Mapping[str, Path]) -> dict[str, Any]:
     """Return all that a campaign's numbers depend on, as JSON data; the plan is a checked one."""
     source = plan.source
     options = {**plan.options.as_data(), "call_limit": plan.options.call_limit, "pace": plan.options.pace}
@@ -196,7 +196,7 @@ class _OfSomeCampaigns(TypedDict, total=False):
 
 
 class CampaignData(_OfSomeCampaigns):
-    """What `campaign.json` holds: see `identity_of`, and what is needed to show the campaign."""
+    """What `campaign.json` holds: see `_identity_of`, and what is needed to show the campaign."""
 
     scenario: str
     points: Annotated[list[dict[str, str]], Meta(min_length=1)]
@@ -263,7 +263,7 @@ class CampaignFolder:
             return
         if not (self.path / _FILE).exists():
             raise InvalidRunFolder(self.path, f"it is not empty and has no {_FILE}; name a new folder, or a campaign's")
-        differ = differences(self.read(), identity_of(plan, fmus))
+        differ = differences(self.read(), _identity_of(plan, fmus))
         if differ:
             raise InvalidRunFolder(self.path, f"it is of another campaign: {'; '.join(differ)}")
         self._check_names(plan)
@@ -378,7 +378,7 @@ class CampaignFolder:
             declared = experiment.parameters()
             display["defaults"] = {v.name: text_of(v, v.start) for v in declared}
             units |= {v.name: v.unit.symbol for v in declared}
-        content = {**identity_of(plan, fmus), **display, PARAMETER_UNITS: units}
+        content = {**_identity_of(plan, fmus), **display, PARAMETER_UNITS: units}
         if not (self.path / _FILE).exists() or self.read() != content:
             write_whole(self.path / _FILE, json.dumps(content, indent=2, allow_nan=False) + "\n")
 
@@ -410,7 +410,7 @@ def default_folder(plan: CampaignPlan, fmus: Mapping[str, Path], opened: context
     The new one is made; `opened` removes it if it is still empty then. So a command that was interrupted resumes where
     it stopped, and one that was complete begins a new campaign. The plan is a checked one.
     """
-    wanted = identity_of(plan, fmus)
+    wanted = _identity_of(plan, fmus)
     for path in sorted(PLACE.glob(f"*_{_stem(plan)}*/"), reverse=True):
         folder = CampaignFolder(path)
         try:

@@ -21,7 +21,7 @@ from handover.scenarios.runs.execution.request import RunRequest
 from handover.scenarios.runs.execution.runner import run_task
 from handover.scenarios.runs.results.run_folder import RunFolder, is_full
 from handover.scenarios.runs.results.summary import ElapsedTime, unstarted_run, unstarted_summary
-from handover.scenarios.runs.results.task import Task
+from handover.scenarios.runs.results.task import Task, task_of
 
 _REFUSALS = (InitializationError, UnitFailure, WiringError, ScheduleError)
 """Why a run cannot begin, where that depends on the run and not on the machine: it would end so each time."""
@@ -69,7 +69,7 @@ def _task(job: RunJob, folder: Path, opened: contextlib.ExitStack) -> Task:
         presented=False,
     )
     fmus = {name: Path(path) for name, path in job.fmus.items()}
-    return Task(**vars(request.open_point(opened)), **request.settings, fmus=fmus, folder=RunFolder(folder))
+    return task_of(request, request.open_point(opened), fmus, RunFolder(folder))
 
 
 def job_result(job: RunJob, work: Callable[[], object]) -> JobResult:

@@ -32,7 +32,7 @@ from handover.scenarios.runs.execution.selection import (
 from handover.scenarios.runs.execution.ssp_run import checked_stop, is_ssp, open_experiment, source_of
 from handover.scenarios.runs.execution.unit_values import split_parameters
 from handover.scenarios.runs.results.run_folder import RunFolder, dated_folder
-from handover.scenarios.runs.results.task import RunSettings, Subject, Task
+from handover.scenarios.runs.results.task import OpenedSubject, RunSettings, Task, task_of
 
 RUNS = Path("runs")
 """Where runs' folders are if nothing names one."""
@@ -74,7 +74,7 @@ class RunRequest(RunSettings):
         asked = self.open(opened)
         stem = Path(asked.experiment.name).stem
         folder = RunFolder(self.out or opened.enter_context(dated_folder(RUNS, stem)))
-        return Task(**vars(asked), **self.settings, fmus=self.fmus(asked.experiment), folder=folder.claim(opened))
+        return task_of(self, asked, self.fmus(asked.experiment), folder.claim(opened))
 
     def check_options(self) -> None:
         """Reject what cannot be run at all, and options that are for another kind of run than this one.
@@ -107,7 +107,7 @@ class RunRequest(RunSettings):
         elif self.stop is not None and self.stop <= 0:
             raise UsageError(f"--stop: {float(self.stop):g} s is not after the scenario's begin at 0 s")
 
-    def open(self, opened: contextlib.ExitStack) -> Subject:
+    def open(self, opened: contextlib.ExitStack) -> OpenedSubject:
         """Return what is to be run; `opened` closes what that opens.
 
         Raises:
@@ -118,7 +118,7 @@ class RunRequest(RunSettings):
         check_effects(type(asked.experiment), asked.parameters)
         return asked
 
-    def open_point(self, opened: contextlib.ExitStack) -> Subject:
+    def open_point(self, opened: contextlib.ExitStack) -> OpenedSubject:
         """Return the same for a point of a campaign, at others of which its parameters may have effects.
 
         Raises:
@@ -131,7 +131,7 @@ class RunRequest(RunSettings):
             system.start = system.start if self.start is None else self.start
             asked = system.start + ENDLESS if self.endless else self.stop
             stop = checked_stop(Path("system"), system.start, asked, None)
-            return Subject(system_experiment("system", "a system wired in Python", system, stop))
+            return OpenedSubject(system_experiment("system", "a system wired in Python", system, stop))
         if isinstance(self.subject, type):
             return self._of_class(self.subject)
         path = self.path
@@ -139,14 +139,14 @@ class RunRequest(RunSettings):
             of_ssp = open_experiment(
                 path, self.stop, self.step, opened, self.parameters, self.start, endless=self.endless
             )
-            return Subject(of_ssp, source=source_of(path, *_times_of(of_ssp), self.step, self.parameters))
+            return OpenedSubject(of_ssp, source=source_of(path, *_times_of(of_ssp), self.step, self.parameters))
         if is_fmu(self.subject):
             alone = FmuRun(path, self.parameters, self.inputs, self.start, self.stop, self.step, self.endless)
             of_fmu = alone.open()
-            return Subject(of_fmu, source=alone.as_source(*_times_of(of_fmu)))
+            return OpenedSubject(of_fmu, source=alone.as_source(*_times_of(of_fmu)))
         scenario = find_scenario(self.subject)
         values = split_parameters(scenario, self.parameters)
-        return Subject(scenario(), *values, own_source(self.subject), self.stop)
+        return OpenedSubject(scenario(), *values, own_source(self.subject), self.stop)
 
     def fmus(self, experiment: Experiment[Any]) -> dict[str, Path]:
         """Return the FMU of each unit of the scenario; those of the catalog are built where they are not yet.
@@ -157,7 +157,7 @@ class RunRequest(RunSettings):
         kind = type(experiment)
         return select_fmus(kind, replacements(kind, self.units), lambda unit: cached(unit, 3))
 
-    def system(self, asked: Subject, seed: int, fmus: Mapping[str, Path]) -> System:
+    def system(self, asked: OpenedSubject, seed: int, fmus: Mapping[str, Path]) -> System:
         """Return the system that is to be run, checked.
 
         Raises:
@@ -168,11 +168,11 @@ class RunRequest(RunSettings):
         system.check()
         return system
 
-    def _of_class(self, scenario: type[Experiment[Any]]) -> Subject:
+    def _of_class(self, scenario: type[Experiment[Any]]) -> OpenedSubject:
         """Return a scenario by its class; that of a program or a notebook has no path by which it is found again."""
         values = split_parameters(scenario, self.parameters)
         path = path_of_class(scenario)
-        return Subject(scenario(), *values, {} if path is None else own_source(path), self.stop)
+        return OpenedSubject(scenario(), *values, {} if path is None else own_source(path), self.stop)
 
     @property
     def path(self) -> Path:

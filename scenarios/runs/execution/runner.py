@@ -276,7 +276,7 @@ def _outcome(
     if master.ended is not None:
         return replace(seen, reason=f"{seen.reason}; {master.ended.summary}")
     if task.is_cut_short and not evaluator.over and master.time >= float(task.stop_time):
-        return replace(seen, success=False, reason=f"{seen.reason}; it was to end at {master.time:g} s")
+        return replace(seen, success=False, reason=f"{seen.reason}; its stop time was reached")
     return seen
 
 

@@ -38,11 +38,11 @@ from handover.scenarios.runs.results.tolerated_faults import ToleratedFaults, dr
 _MAX_BARS = 24
 """Units that have a bar of their own; of more, the cheapest share one."""
 
-_REST = "master, recording and other"
+_REST_OF_CPU = "master, recording and other"
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Bar:
+class _CpuBar:
     label: str
     seconds: float
     colour: str = "var(--c0)"
@@ -62,29 +62,29 @@ def cpu_section(summary: Mapping[str, Any]) -> Section | None:
     total = sum(u["cpu_seconds"] for u in units) + rest
     if total <= 0.0:
         return None
-    bars = [*_bars(units), _Bar(label=_REST, seconds=rest, colour="var(--soft)")]
+    bars = [*_cpu_bars(units), _CpuBar(label=_REST_OF_CPU, seconds=rest, colour="var(--soft)")]
     html = template("cpu.html").render(
-        plot=_plot(bars, total),
-        rows=[(u, _per_step(u), _share(u["cpu_seconds"], total)) for u in units],
-        rest=(_REST, rest, _share(rest, total)),
+        plot=_cpu_plot(bars, total),
+        rows=[(u, _per_step(u), _cpu_share(u["cpu_seconds"], total)) for u in units],
+        rest=(_REST_OF_CPU, rest, _cpu_share(rest, total)),
         total=total,
         simulated=summary["simulated_seconds"],
     )
     return Section(anchor="cpu", title="CPU time", html=Markup(html))
 
 
-def _bars(units: Sequence[Mapping[str, Any]]) -> list[_Bar]:
+def _cpu_bars(units: Sequence[Mapping[str, Any]]) -> list[_CpuBar]:
     """Return bars of the units, the most expensive first."""
     ordered = sorted(units, key=lambda u: -u["cpu_seconds"])
-    bars = [_Bar(label=u["name"], seconds=u["cpu_seconds"]) for u in ordered[:_MAX_BARS]]
+    bars = [_CpuBar(label=u["name"], seconds=u["cpu_seconds"]) for u in ordered[:_MAX_BARS]]
     if others := ordered[_MAX_BARS:]:
-        bars.append(_Bar(label=f"{len(others)} other units", seconds=sum(u["cpu_seconds"] for u in others)))
+        bars.append(_CpuBar(label=f"{len(others)} other units", seconds=sum(u["cpu_seconds"] for u in others)))
     return bars
 
 
-def _plot(bars: Sequence[_Bar], total: float) -> Markup:
+def _cpu_plot(bars: Sequence[_CpuBar], total: float) -> Markup:
     seconds = [b.seconds for b in bars]
-    texts = [f"{s:.3g} s, {_share(s, total)}" for s in seconds]
+    texts = [f"{s:.3g} s, {_cpu_share(s, total)}" for s in seconds]
     bar = go.Bar(
         x=seconds,
         y=[_in_two_lines(b.label) for b in bars],
@@ -115,7 +115,7 @@ def _in_two_lines(label: str) -> str:
     return label.replace(", ", ",<br>", 1)
 
 
-def _share(seconds: float, total: float) -> str:
+def _cpu_share(seconds: float, total: float) -> str:
     percent = 100.0 * seconds / total
     return f"{percent:.0f} %" if percent >= 9.95 else f"{percent:.1f} %"
 
@@ -125,11 +125,11 @@ def _per_step(unit: Mapping[str, Any]) -> float | None:
     return 1000.0 * unit["cpu_seconds"] / unit["steps"] if unit.get("steps") else None
 
 
-_WIDTHS = (960, 800, 640, 480, 360)
+_PICTURE_WIDTHS = (960, 800, 640, 480, 360)
 """Widths to choose from, px: the greatest at which all pictures have room in the page."""
 
-_QUALITY = 80
-_MAX_BYTES = 1_200_000
+_JPEG_QUALITY = 80
+_MAX_PICTURE_BYTES = 1_200_000
 """Size of all pictures in a page together, in base64."""
 
 
@@ -157,19 +157,19 @@ def pictures_section(folder: RunFolder) -> Section | None:
     if not pictures:
         return None
     moments: dict[tuple[float, str], list[_DisplayedPicture]] = {}
-    for picture, data in zip(pictures, _inline(pictures), strict=True):
+    for picture, data in zip(pictures, _inlined_pictures(pictures), strict=True):
         moments.setdefault((picture.t, picture.role), []).append(_DisplayedPicture(picture=picture, data=data))
     marks = {mark.label: mark for picture in pictures for mark in picture.marks}
     html = template("pictures.html").render(moments=moments, legend=list(marks.values()), place=_mark_style)
     return Section(anchor="pictures", title="What the cameras saw", html=Markup(html))
 
 
-def _inline(pictures: Sequence[CameraPicture]) -> list[str]:
+def _inlined_pictures(pictures: Sequence[CameraPicture]) -> list[str]:
     """Return the pictures in base64, at the greatest width at which all have room."""
     encoded: list[str] = []
-    for width in _WIDTHS:
+    for width in _PICTURE_WIDTHS:
         encoded = [base64.b64encode(_scaled_down(p, width)).decode() for p in pictures]
-        if sum(map(len, encoded)) <= _MAX_BYTES:
+        if sum(map(len, encoded)) <= _MAX_PICTURE_BYTES:
             break
     return encoded
 
@@ -179,7 +179,7 @@ def _scaled_down(picture: CameraPicture, width: int) -> bytes:
         return picture.jpeg
     height = math.ceil(picture.height * width / picture.width)
     pixels = cv2.resize(picture.pixels, (width, height), interpolation=cv2.INTER_AREA)
-    return cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1].tobytes()
+    return cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])[1].tobytes()
 
 
 def _mark_style(mark: Mark, picture: CameraPicture) -> str:

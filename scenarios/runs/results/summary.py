@@ -2,7 +2,7 @@
 
 However a run ends, its summary is made here: `finished_summary`, also where a unit failed; `crashed_summary`, where the
 run's process ended; `unstarted_summary`, where it could not begin; and `unwritten_summary`, of a run that wrote none.
-`describe_system` is what `run.json` keeps of the system for the report's graph, `run_metrics` the metrics of every
+`describe_system` is what `run.json` keeps of the system for the report's graph, `_run_metrics` the metrics of every
 run.
 """
 
@@ -40,7 +40,7 @@ _MAX_ICON = 200_000
 
 
 def describe_system(system: System, *, adaptive: bool) -> dict[str, Any]:
-    """Return the units and connections of a checked system, as JSON can hold them; for `adaptive` see `own_period`.
+    """Return the units and connections of a checked system, as JSON can hold them; for `adaptive` see `_own_period`.
 
     A unit has the icon in its FMU, as the FMU may be gone or changed when a report is made of the folder; not that
     which the catalog has for its name anyway. Of an icon whose SVG has more than 200 kB the PNG is kept, if it
@@ -54,7 +54,7 @@ def describe_system(system: System, *, adaptive: bool) -> dict[str, Any]:
             "name": name,
             "model": unit.description.name,
             "fmi": str(unit.description.fmi),
-            "period": own_period(unit, adaptive=adaptive),
+            "period": _own_period(unit, adaptive=adaptive),
             "sampled": unit.sampled,
             **_own_icon(unit),
         }
@@ -73,7 +73,7 @@ def _own_icon(unit: PlacedUnit) -> dict[str, dict[str, str]]:
     return {"icon": {"type": mime, "base64": base64.b64encode(content).decode()}}
 
 
-def own_period(unit: PlacedUnit, *, adaptive: bool) -> float | None:
+def _own_period(unit: PlacedUnit, *, adaptive: bool) -> float | None:
     """Return a unit's step, s; None where it varies: with adaptive steps, only sampled units keep their own."""
     return None if adaptive and not unit.sampled else float(unit.period)
 
@@ -87,7 +87,7 @@ def _describe_connection(system: System, c: Connection) -> dict[str, Any]:
     return {"source": str(c.source), "target": str(c.target), "unit": unit, "size": size, "kind": kind}
 
 
-def run_metrics(experiment: Experiment[Any], master: Master) -> dict[str, Metric]:
+def _run_metrics(experiment: Experiment[Any], master: Master) -> dict[str, Metric]:
     """Return the metrics that every run has, by name: memory, CPU times, and iterations if steps were iterated."""
     medians = [statistics.median(master.cpu[u]) for u in experiment.cycle() if master.cpu[u]]
     peak = peak_memory()
@@ -100,7 +100,7 @@ def run_metrics(experiment: Experiment[Any], master: Master) -> dict[str, Metric
     for name, spent in master.cpu.items():
         total = float(np.sum(spent))
         metrics[f"cpu_{name}"] = Metric(total, "s", f"CPU time of {name} in all")
-        period = own_period(master.system.units[name], adaptive=master.steps is not None)
+        period = _own_period(master.system.units[name], adaptive=master.steps is not None)
         simulated = master.time if period is None else len(spent) * period
         metrics[f"pace_{name}"] = Metric(simulated / total if total else 0.0, "1", f"simulated s per CPU s of {name}")
     return {**metrics, **_iterations(master.iterations)}
@@ -179,7 +179,7 @@ def finished_summary(
     not_finite: Sequence[NotFiniteData] = (),
 ) -> dict[str, Any]:  # fmt: skip
     """Return the summary of a run that came to its end, failed, or was interrupted."""
-    metrics = {**outcome.metrics, **run_metrics(task.experiment, master)}
+    metrics = {**outcome.metrics, **_run_metrics(task.experiment, master)}
     steps: dict[str, Any] = {} if master.steps is None else {"steps": asdict(master.steps)}
     summary = dict[str, Any](
         **configuration(task),
@@ -346,7 +346,7 @@ def _units(master: Master) -> list[UnitData]:
     cpu = master.cpu
     for name, unit in master.system.units.items():
         model, spent = f"{unit.description.name} (FMI {unit.description.fmi})", cpu[name]
-        period = own_period(unit, adaptive=master.steps is not None)
+        period = _own_period(unit, adaptive=master.steps is not None)
         step = "varies" if period is None else f"{period * 1000:.4g} ms"
         units.append(UnitData(name=name, model=model, step=step, steps=len(spent), cpu_seconds=sum(spent)))
     return units

@@ -53,14 +53,9 @@ class RunSettings:
     pushed: bool = False
     recorded: Sequence[str] = ()
 
-    @property
-    def settings(self) -> dict[str, Any]:
-        """These values by name."""
-        return {f.name: getattr(self, f.name) for f in fields(RunSettings)}
-
 
 @dataclass(frozen=True)
-class Subject:
+class OpenedSubject:
     """What is run: a scenario with its parameters, or what runs a file or a system as one.
 
     Attributes:
@@ -78,7 +73,7 @@ class Subject:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Task(Subject, RunSettings):
+class Task(OpenedSubject, RunSettings):
     """A run before it begins.
 
     Attributes:
@@ -86,6 +81,8 @@ class Task(Subject, RunSettings):
         folder: where its results are written.
     """
 
+    parameters: Any = field()  # no default: a task that lacks it would be another run
+    seed: int = field()
     fmus: Mapping[str, Path]
     folder: RunFolder
 
@@ -98,3 +95,9 @@ class Task(Subject, RunSettings):
     def is_cut_short(self) -> bool:
         """Whether it is to stop before the scenario itself would end it."""
         return self.stop is not None and self.stop < self.experiment.stop_time(self.parameters)
+
+
+def task_of(settings: RunSettings, opened: OpenedSubject, fmus: Mapping[str, Path], folder: RunFolder) -> Task:
+    """Return the task of what is run with its settings."""
+    shared = {f.name: getattr(settings, f.name) for f in fields(RunSettings)}
+    return Task(**vars(opened), **shared, fmus=fmus, folder=folder)

@@ -27,7 +27,7 @@ _TURNS = (("roll", (1.0, 0.0, 0.0)), ("pitch", (0.0, 1.0, 0.0)), ("yaw", (0.0, 0
 _CLOSE, _ANGLE, _STAY = 0.03, 0.4, 0.3
 """How near to a place, m, how far turned, rad, and for how long, s, it counts as reached (assumed)."""
 _FISTS = 2
-TURNING = ("mouse", "gamepad", "webcam", "tracker")
+_TURNING = ("mouse", "gamepad", "webcam", "tracker")
 """Devices that turn the hand."""
 
 
@@ -56,7 +56,7 @@ class DeviceTest:
     """
 
     def __init__(self, device: str, led: LedHand) -> None:
-        turns = [(f"{sign}{axis}", None) for axis, _ in _TURNS for sign in "+-"] if device in TURNING else []
+        turns = [(f"{sign}{axis}", None) for axis, _ in _TURNS for sign in "+-"] if device in _TURNING else []
         self._unit = led.unit
         self._asked = [*_places(np.array(led.p_WH_0)), *turns, *(("fist", None) for _ in range(_FISTS))]
         self.reached: list[Reached] = []

@@ -37,9 +37,9 @@ from handover.scenarios.study.folder.session_folder import RoundRecord
 from handover.scenarios.study.folder.session_notes import timestamp
 from handover.scenarios.study.plan.led_hands import led_hand_of
 
-_LONGEST = 60_000.0
+_LONGEST_LATENCY = 60_000.0
 """Time that counts as a measurement at most, ms; a page that was hidden for longer draws nothing."""
-_MOST = 100_000
+_MOST_LATENCIES = 100_000
 """Measurements that are kept: of half an hour at 60 pictures a second."""
 
 
@@ -57,8 +57,8 @@ class LatencyLog:
         """
         given: list[Any] = cast(list[Any], values) if isinstance(values, list) else [None]
         if not all(_is_time(v) for v in given):
-            raise ValueError(f"drawn takes a list of times from 0 to {_LONGEST:g} ms")
-        self._times += [float(v) for v in given][: _MOST - len(self._times)]
+            raise ValueError(f"drawn takes a list of times from 0 to {_LONGEST_LATENCY:g} ms")
+        self._times += [float(v) for v in given][: _MOST_LATENCIES - len(self._times)]
 
     @property
     def median(self) -> float | None:
@@ -81,10 +81,10 @@ class LatencyLog:
 
 def _is_time(value: Any) -> bool:
     is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    return is_number and 0.0 <= value <= _LONGEST
+    return is_number and 0.0 <= value <= _LONGEST_LATENCY
 
 
-def median_ms(ages: Sequence[float]) -> float | None:
+def _median_ms(ages: Sequence[float]) -> float | None:
     """Return the median of ages in s, in ms; None of none."""
     return round(1000.0 * float(np.median(ages)), 3) if len(ages) else None
 
@@ -338,7 +338,7 @@ class Trial:
             latency_median_ms=self.latency.median,
             latency_p95_ms=self.latency.p95,
             latency_max_ms=self.latency.longest,
-            age_at_use_ms=median_ms(self._inputs.ages().tolist()),
+            age_at_use_ms=_median_ms(self._inputs.ages().tolist()),
             missed_deadlines=pace.get("missed"),
         )
 

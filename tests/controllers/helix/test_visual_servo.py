@@ -256,7 +256,7 @@ def test_a_measurement_far_off_is_refused_and_many_are_believed():
         assert (np.linalg.norm(y.p_WR_est - run.arm.pose()[:3]) < 0.02) == (n < 3), n
 
 
-def test_a_ball_out_of_the_models_reach_is_reported_from_one_that_a_sagging_arm_cannot_reach():
+def test_a_ball_out_of_the_models_reach_is_distinguished_from_one_that_a_sagging_arm_cannot_reach():
     for p_WO, verdict in ((FAR, Verdict.OUT_OF_REACH), (np.array([0.5, 0.0, -0.3]), Verdict.LIMITS)):
         run = own(patience=15)
         y = run.run(Phase.GIVEN_UP, p_WO)

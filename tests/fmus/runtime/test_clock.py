@@ -132,7 +132,7 @@ def test_a_step_past_a_tick_returns_early_or_is_refused(workshop: Workshop, word
     assert whole.step(0.0, P) == OK
 
 
-def test_a_host_that_has_activated_the_clock_is_reported_of_a_tick_once_and_then_refused(
+def test_a_host_that_has_activated_the_clock_is_notified_of_a_tick_once_and_then_refused(
     workshop: Workshop, wording: Wording
 ):
     host = with_events(workshop, SAMPLED, early_return=True)

@@ -72,7 +72,7 @@ def pushed(p: Params, velocity: tuple[float, float]) -> tuple[GraspWorld, Floats
     return world, np.array(world.snapshot[1][1][:2]) - (x, y)
 
 
-def test_the_centre_of_mass_is_where_it_is_reported_and_O_stays_where_it_is():
+def test_the_centre_of_mass_is_where_it_is_given_and_O_stays_where_it_is():
     p = replace(AWAY, thing=Thing.BAR, mass_offset=np.array([0.02, 0.004]), yaw_O_0=0.5, p_WO_0=np.array([0.03, 0.01]))
     world, way = pushed(p, (0.3, 0.4))
     np.testing.assert_allclose(way, 0.5 / (2.0 * 0.3 * 9.81) * np.array([0.3, 0.4]), atol=3e-4)

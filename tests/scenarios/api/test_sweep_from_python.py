@@ -12,7 +12,7 @@ from support.in_process_pool import InProcessPool
 
 import handover
 from handover.scenarios.robots.ir_grasp.ir_grasp import IrGrasp
-from handover.scenarios.runs.campaign import pool_config
+from handover.scenarios.runs.campaign import pools
 from handover.scenarios.runs.campaign.table import CampaignTable
 
 GIVEN: dict[str, Any] = {"seeds": 2, "strategy": ["blind", "reflex"], "standoff": 0.06}
@@ -39,7 +39,7 @@ def test_a_program_without_a_main_guard_sweeps(tmp_path: Path):
 @pytest.fixture
 def in_process(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let this process be the workers."""
-    monkeypatch.setattr(pool_config, "LocalPool", InProcessPool.opened)
+    monkeypatch.setattr(pools, "LocalPool", InProcessPool.opened)
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +47,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder of a campaign of four runs, two at a point."""
     out = tmp_path_factory.mktemp("campaigns") / "c"
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(pool_config, "LocalPool", InProcessPool.opened)
+        patched.setattr(pools, "LocalPool", InProcessPool.opened)
         handover.sweep("ir_grasp", **GIVEN, out=out, progress=False)
     return out
 

@@ -24,7 +24,7 @@ STARTS = {
     "study power": "handover.scenarios.study.statistics.power.simulated_power",
 }
 """By command the function that an example would start, before which it is ended."""
-CLUSTER = "handover.scenarios.runs.campaign.pool_config.PoolConfig.check"
+CLUSTER = "handover.scenarios.runs.campaign.pools.PoolConfig.check"
 """Looks for a scheduler at an address that is nobody's here; the plan has been checked then."""
 RUN = ("list", "new", "build", "export", "study new", "study plan")
 

@@ -107,7 +107,7 @@ def test_a_place_with_a_port_that_there_is_not_is_reported():
             show(Misplaced, "reflex")
 
 
-def test_an_export_replaces_a_file_only_when_reported_to(tmp_path: Path):
+def test_an_export_replaces_a_file_only_when_forced(tmp_path: Path):
     file = tmp_path / "grasp.ssp"
     file.write_text("something")
     assert "it is there already; --force replaces it" in refusal("export", "ir_grasp", "--ssp", file)

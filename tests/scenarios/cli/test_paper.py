@@ -12,7 +12,7 @@ from support.in_process_pool import InProcessPool
 from handover.scenarios.pages.campaign_report.campaign_page import write_campaign_page
 from handover.scenarios.published.catalog import EXPERIMENTS
 from handover.scenarios.published.ir_grasp.ir_table import IrTable
-from handover.scenarios.runs.campaign import pool_config
+from handover.scenarios.runs.campaign import pools
 from handover.scenarios.runs.campaign.folder import CampaignFolder
 
 _PUBLISHED_VERDICTS = {"reproduced", "not reproduced", "not comparable"}
@@ -38,7 +38,7 @@ def test_it_leaves_claims_figures_and_a_page_and_a_second_call_repeats_nothing(
     cylinder = [point for point in whole.points if point["thing"] == "cylinder"]
     few = replace(whole, points=cylinder, repetitions=1)
     monkeypatch.setattr(EXPERIMENTS["ir-table"], "plan", lambda _experiment, quick: few)  # type: ignore  # noqa: ARG005
-    monkeypatch.setattr(pool_config, "LocalPool", InProcessPool.opened)
+    monkeypatch.setattr(pools, "LocalPool", InProcessPool.opened)
     folder = tmp_path / "c"
     first = paper("ir-table", "--quick", "--out", folder)
     assert first.exit_code == 0, first.output

@@ -12,8 +12,8 @@ from support.cosim.native_units import native_fmu
 from support.in_process_pool import InProcessPool
 
 from handover.cosim.files import folder_locked
-from handover.scenarios.runs.campaign import plan_check, pool_config
-from handover.scenarios.runs.campaign.pool_config import LocalPool
+from handover.scenarios.runs.campaign import plan_check, pools
+from handover.scenarios.runs.campaign.pools import LocalPool
 from handover.scenarios.runs.campaign.table import CampaignTable
 from handover.scenarios.runs.campaign.worker_pool import RunJob
 from handover.scenarios.runs.execution.errors import ClusterLost, PoolError
@@ -39,7 +39,7 @@ def sweep(
     def given(_workers: int | None) -> contextlib.AbstractContextManager[InProcessPool]:
         return contextlib.nullcontext(pool)
 
-    monkeypatch.setattr(pool_config, "LocalPool", given)
+    monkeypatch.setattr(pools, "LocalPool", given)
     return call(*CALL, *more), pool.begun
 
 

@@ -129,7 +129,7 @@ def test_a_flood_is_refused_until_it_ebbs(wording: Wording):
     stream.take(1.1, after=1.1)
 
 
-def test_stamps_of_another_clock_are_reported_by_this_ones_also_of_a_device_that_looks_at_pictures_first():
+def test_stamps_of_another_clock_are_converted_to_this_one_also_of_a_device_that_looks_at_pictures_first():
     rng = np.random.default_rng(0)
     clock, ages = DeviceClock(), list[float]()
     for k in range(200):

@@ -103,7 +103,7 @@ def test_the_page_shows_the_hand_that_a_mouse_or_gamepad_leads_and_its_record_is
     assert all(np.array_equal(again[name][: len(led.time)], led[name]) for name in led.signals)
 
 
-def test_who_leads_a_hand_is_reported_what_to_do_and_one_that_the_person_leads_nobody_leads(wording: Wording):
+def test_who_leads_a_hand_is_advised_and_one_that_the_person_leads_nobody_leads(wording: Wording):
     outside, to_robot = ("hand=outside",), "task=human_to_robot"
     for scenario, given in (
         (SCENARIO, outside),

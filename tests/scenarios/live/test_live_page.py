@@ -186,7 +186,7 @@ def test_the_page_shows_what_the_cameras_see_and_the_run_is_the_same(browser: Br
     assert a == b
 
 
-def test_pages_are_reported_of_a_record_that_is_damaged_and_the_session_goes_on(
+def test_pages_are_informed_of_a_record_that_is_damaged_and_the_session_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     page, messages = LivePage(), list[dict[str, str]]()

@@ -6,7 +6,7 @@ from pathlib import Path
 
 if __name__ == "__main__":
     from handover.scenarios.runs.campaign.cluster import connect_cluster
-    from handover.scenarios.runs.campaign.pool_config import LocalPool
+    from handover.scenarios.runs.campaign.pools import LocalPool
 
     jobs = pickle.loads(Path(sys.argv[1]).read_bytes())
     try:

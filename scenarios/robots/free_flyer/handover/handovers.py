@@ -20,7 +20,6 @@ from handover.cosim.blocks.geometry import rotation_of
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.cosim.system.system import PortName, System
-from handover.plants.free_flyer.hand.parameters import Params
 from handover.plants.free_flyer.hand.parameters import Params as PersonParams
 from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf
 from handover.scenarios.experiment.live_inputs import HandHint, LedHand, Pushable
@@ -112,13 +111,14 @@ def _taking(record: Record, p_WH: Floats, holder: str, felt: str, *, closed: boo
 def _giving(record: Record, p_WH: Floats, holder: str, felt: str) -> HandHint:
     if holder == "BOTH":
         return HandHint(p_WH, None, holds=True, advice="The gripper has it, too: open your hand.")
-    gripper, half = Params(), 0.5 * float(np.array(Params().object_size)[1])
+    person = PersonParams()
+    half = 0.5 * float(np.array(person.object_size)[1])
     axis, p_WG = rotation_of(record["person.q_WO"][-1])[:, 1], record["robot.p_WG"][-1]
     p_WO = record["person.p_WO"][-1]
     to_gripper = p_WG - p_WO
     to_gripper -= float(np.clip(axis @ to_gripper, -half, half)) * axis  # from the nearest point of its centre line
     to_gripper_G: Floats = to_gripper @ rotation_of(record["robot.q_WG"][-1])
-    within = bool(abs(to_gripper_G[0]) <= gripper.capture_axial and abs(to_gripper_G[2]) <= gripper.capture_lateral)
+    within = bool(abs(to_gripper_G[0]) <= person.capture_axial and abs(to_gripper_G[2]) <= person.capture_lateral)
     if float(np.linalg.norm(to_gripper)) > _NEAR:
         return HandHint(p_WH, None, holds=True, advice="You hold the object: the robot comes to take it.")
     here, there = (

@@ -1,6 +1,6 @@
 """Evaluates a handover between two robots and a person by ground truth, which the robots' computers do not see.
 
-What became of each robot, `TeamMember`, and why a handover by two failed, `TeamCause`.
+What became of each robot, `OneRobot`, and why a handover by two failed, `TeamCause`.
 """
 
 import enum

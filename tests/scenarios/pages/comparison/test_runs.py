@@ -161,12 +161,24 @@ def test_metrics_stand_beside_each_other(tmp_path: Path):
     rows = metric_rows(runs(first, second))
     assert [(r.name, r.description) for r in rows] == [("gap", "gap"), ("x", "gap")]
     np.testing.assert_array_equal([[*r.values.values()] for r in rows], [[0.2, np.nan], [0.1, np.nan]])
-    stops = [metric(k, "1", f"why, by number: {k} is {name}") for k, name in ((1, "patience"), (5, "blind"))]
-    stopped = [run(tmp_path / f"stop{k}", [0.0, 1.0], {}, metrics={"stop": stop}) for k, stop in enumerate(stops)]
-    assert metric_rows(runs(*stopped))[0].description == "why, by number: 1 is patience; 5 is blind"
     third = run(tmp_path / "c", [0.0, 1.0], {}, metrics={"x": metric(1.0, "s")})
     with pytest.raises(NotComparable, match=f"{third}: its metric x is in s, not in m"):
         metric_rows(runs(first, second, third))
+
+
+@pytest.mark.parametrize(
+    ("descriptions", "common"),
+    [
+        (("why: 1 is patience", "why: 5 is blind"), "why: 1 is patience; 5 is blind"),
+        (("cost: of three", "cost: of three (sees nothing)"), "cost: of three"),
+        (("why", "why: 1 is patience"), "why"),
+        (("why: 1 is patience", "how"), "stop"),
+    ],
+)
+def test_what_a_metric_is_in_one_run_is_left_out_or_listed(descriptions: tuple[str, str], common: str, tmp_path: Path):
+    metrics = [{"stop": {"value": 1, "unit": "1", "description": text}} for text in descriptions]
+    stopped = [run(tmp_path / f"{k}", [0.0, 1.0], {}, metrics=of_run) for k, of_run in enumerate(metrics)]
+    assert metric_rows(runs(*stopped))[0].description == common
 
 
 def test_parameters_units_and_versions_that_differ_are_listed(tmp_path: Path):

@@ -69,7 +69,7 @@ def test_every_claim_is_judged_both_ways(wording: Wording):
     assert sum("did not come to an end" in c.reason for c in verdicts(late).values()) == 1
 
 
-def test_no_controller_of_the_plan_is_reported_of_a_delay_that_it_would_reject():
+def test_no_controller_of_the_plan_is_given_a_delay_that_it_would_reject():
     for point in FlyerControllers().plan(quick=False).points:
         assert ("delay" in point) == (point.get("impedance.delay") == "0")
 

@@ -72,7 +72,7 @@ def test_both_behaviours_share_the_seeds_of_a_participants_trials_and_nobody_els
     assert len({tuple(person.values()) for person in participants()}) == 10
 
 
-def test_a_participants_trials_are_reported_from_those_of_a_skill():
+def test_a_participants_trials_are_distinguished_from_those_of_a_skill():
     runs = StudyRuns(table_of())
     assert len(runs.of_participants(Task.ROBOT_TO_HUMAN, Behaviour.RIGID)) == 200
     assert len(runs.by_participant(Task.ROBOT_TO_HUMAN, Behaviour.RIGID)[3]) == 20

@@ -26,7 +26,7 @@ from handover.scenarios.published.published_experiment import Claim, PaperResult
 from handover.scenarios.runs.campaign.campaign import run_campaign
 from handover.scenarios.runs.campaign.folder import CampaignFolder
 from handover.scenarios.runs.campaign.plan_check import checked_plan, prepared
-from handover.scenarios.runs.campaign.pool_config import LocalPool
+from handover.scenarios.runs.campaign.pools import LocalPool
 from handover.scenarios.runs.campaign.statistics import MIN_SAMPLES
 from handover.scenarios.runs.campaign.table import CampaignTable
 

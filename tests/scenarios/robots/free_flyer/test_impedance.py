@@ -230,7 +230,7 @@ ASSUMED = "what its controllers assumed"
         (("navigation.delay=0.008",), "the robot's thrust followed its state 8 ms late, of which impedance knew 0 ms"),
     ],
 )
-def test_what_the_controllers_do_not_know_is_reported_by_the_values_that_the_units_got(
+def test_what_the_controllers_do_not_know_is_found_from_the_values_that_the_units_got(
     given: tuple[str, ...], told: str, tmp_path: Path
 ):
     assert model_mismatch(system_of(tmp_path, *given).units) == (f"; {told}" if told else "")

@@ -17,7 +17,7 @@ from support.cosim.native_units import native_fmu
 from support.in_process_pool import InProcessPool
 
 from handover.cosim.stepping.options import MasterOptions
-from handover.scenarios.runs.campaign import pool_config
+from handover.scenarios.runs.campaign import pools
 from handover.scenarios.runs.campaign.cluster import ClusterPool
 from handover.scenarios.runs.campaign.run_server import RunServer
 from handover.scenarios.runs.campaign.table import CampaignTable
@@ -43,7 +43,7 @@ def sweep(monkeypatch: pytest.MonkeyPatch, pool: WorkerPool) -> Result:
     def given(_workers: int | None) -> Generator[WorkerPool, None, None]:
         yield pool
 
-    monkeypatch.setattr(pool_config, "LocalPool", given)
+    monkeypatch.setattr(pools, "LocalPool", given)
     return call(*CALL)
 
 

@@ -7,7 +7,7 @@ from support.commands import call, data_in, refusal
 from support.in_process_pool import InProcessPool
 from support.killed_run import killed_run
 
-from handover.scenarios.runs.campaign import pool_config
+from handover.scenarios.runs.campaign import pools
 
 ROWS = "0.30,0.0,0.10", "0.32,0.0,0.12"
 OTHER = "0.30,0.0,0.10", "0.34,0.0,0.10"
@@ -48,7 +48,7 @@ def test_a_repeated_run_says_that_a_file_is_another(way: Path):
 
 @pytest.mark.slow
 def test_a_campaign_is_another_with_another_file(way: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(pool_config, "LocalPool", InProcessPool.opened)
+    monkeypatch.setattr(pools, "LocalPool", InProcessPool.opened)
     sweep = ("sweep", "vsl_model_based", "load=0", *CUSTOM, "--stop", "0.1", "--no-report", "--out", "campaign")
     assert [call(*sweep).exit_code for _ in range(2)] == [0, 0]
     write(way, OTHER)

@@ -19,7 +19,9 @@ def test_a_unit_of_the_catalog_takes_a_place_by_its_name_but_a_file_of_that_name
 
 
 @pytest.mark.parametrize("given", ["gentle.py", "gentle.py:Gentle", "gentle", "./gentle.py"])
-def test_a_python_file_is_reported_how_its_block_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, given: str):
+def test_a_python_file_is_refused_with_how_its_block_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, given: str
+):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "gentle.py").write_text("class Params: ...\nclass Gentle:\n    def step(self, t, dt, u): ...\n")
     with pytest.raises(UsageError, match=r"^unit servo: .*gentle.* is named MODULE:CLASS: gentle:Gentle$"):

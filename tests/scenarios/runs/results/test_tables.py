@@ -84,7 +84,7 @@ def test_the_report_says_how_units_were_coupled(tmp_path: Path):
     assert any(row[2:3] == ["varies"] for row in page.rows)
 
 
-def test_a_pace_that_was_changed_on_the_way_is_reported_so_with_deadlines_only_where_there_were_some():
+def test_a_pace_that_was_changed_on_the_way_is_reported_with_deadlines_only_where_there_were_some():
     pace = {"largest_lateness": 0.0, "latest_at": None, "missed": 0, "reached": None, "share": 0.0, "changed": True}
     fast = {"pace": {**pace, "pace": None, "deadlines": 0, "first": 1.0}}
     assert pace_rows(fast) == [("pace", "changed on the way, 1 x real time at first, as fast as it goes at last")]

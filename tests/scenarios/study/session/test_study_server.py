@@ -90,7 +90,7 @@ def test_signals_end_it_from_the_moment_on_that_its_address_is_printed(number: s
     assert "Ctrl-C ends it" in told[0]
 
 
-def test_a_second_page_is_reported_that_the_seat_is_taken_and_the_first_stays(tmp_path: Path):
+def test_a_second_page_is_informed_that_the_seat_is_taken_and_the_first_stays(tmp_path: Path):
     server = server_of(tmp_path / "study")
     with served(server) as where:
         with page_at(where) as first:

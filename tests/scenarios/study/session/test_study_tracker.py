@@ -54,7 +54,7 @@ def test_a_tracker_leads_the_hand_and_its_pictures_are_timed_by_the_pages_clock(
 
 
 @pytest.mark.usefixtures("without_runs")
-def test_a_tracker_is_reported_why_it_is_refused(tmp_path: Path):
+def test_a_refused_tracker_gets_the_reason(tmp_path: Path):
     with served(server_of(tmp_path / "study")) as where, page_at(where) as page:
         with (
             pytest.raises(InvalidStatus),

@@ -234,7 +234,7 @@ def test_a_round_that_the_servers_end_broke_off_is_an_attempt_in_the_tables(tmp_
     assert table["folder"].tolist() == ["01_unfinished_1", "01_unfinished_2"]
 
 
-def test_who_carries_the_study_out_is_reported_what_became_of_each_round(tmp_path: Path, wording: Wording):
+def test_the_experimenter_sees_what_became_of_each_round(tmp_path: Path, wording: Wording):
     seat = server_of(tmp_path / "study").seat
     seat.on_round_end = lambda planned, ended: wording.check(line_of_round(PLAN, 1, planned, ended))
     choose_mouse(seat.protocol)

@@ -13,8 +13,8 @@ import pytest
 from support.processes import family, lives, program, servers, until
 from support.scenarios.sample_jobs import bad_job, quick_job
 
-from handover.scenarios.runs.campaign import pool_config
-from handover.scenarios.runs.campaign.pool_config import LocalPool
+from handover.scenarios.runs.campaign import pools
+from handover.scenarios.runs.campaign.pools import LocalPool
 from handover.scenarios.runs.campaign.run_servers import JobRunner
 from handover.scenarios.runs.campaign.worker_pool import JobResult, RunJob, WorkerPool, cores
 
@@ -103,7 +103,7 @@ def test_nobody_can_speak_to_it(pool: WorkerPool, runs: Path):
 
 def test_by_default_there_is_a_worker_for_each_core(monkeypatch: pytest.MonkeyPatch):
     assert cores() == len(os.sched_getaffinity(0))
-    monkeypatch.setattr(pool_config, "cores", lambda: 3)
+    monkeypatch.setattr(pools, "cores", lambda: 3)
     assert LocalPool(None).workers == 3
 
 

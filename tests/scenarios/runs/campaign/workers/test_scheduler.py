@@ -15,7 +15,7 @@ from support.wording import Wording
 from handover.scenarios.runs.campaign import cluster
 from handover.scenarios.runs.campaign import scheduler as of_scheduler
 from handover.scenarios.runs.campaign.cluster import call_with_timeout
-from handover.scenarios.runs.campaign.pool_config import PoolConfig
+from handover.scenarios.runs.campaign.pools import PoolConfig
 from handover.scenarios.runs.campaign.scheduler import scheduler_address
 from handover.scenarios.runs.execution.errors import PoolError
 

@@ -1,4 +1,4 @@
-"""Configuration of a campaign's worker pool, workers of this machine or of a Dask scheduler, and its lazy start.
+"""The workers of this machine, and the choice between them and those of a Dask scheduler, which start lazily.
 
 On this machine there is a thread for each worker, which gives jobs to a run server. Dask, which takes a while to load,
 is imported for the workers of a scheduler alone.
