@@ -138,9 +138,10 @@ def _closing(end: socket.socket) -> Callable[[], None]:
 
 
 def _say(line: str) -> None:
-    """Write to standard error past its buffer, which the signal may have interrupted.
+    """Write to standard error past its buffer, which the signal may have interrupted; not if its terminal was closed.
 
     On a terminal it begins a line, as ^C or a progress bar is on the one before.
     """
     begin = "\n" if os.isatty(2) else ""
-    os.write(2, f"{begin}{line}\n".encode())
+    with contextlib.suppress(OSError):
+        os.write(2, f"{begin}{line}\n".encode())

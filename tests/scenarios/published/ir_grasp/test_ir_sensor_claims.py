@@ -63,12 +63,13 @@ def test_one_curve_is_judged_by_its_worst_error_at_the_target(error: float, hold
     assert (claim.verdict is Verdict.REPRODUCED) is holds
 
 
-def test_one_curve_has_no_verdict_where_a_reflectivity_was_not_run():
-    def unmeasured(run: PlannedRun) -> float | None:
-        return None if run.parameters["reflectivity"] == "1.5" else 0.010
+@pytest.mark.parametrize(("error", "verdict"), [(0.0, Verdict.NOT_COMPARABLE), (0.005, Verdict.NOT_REPRODUCED)])
+def test_one_curve_is_refuted_but_not_confirmed_where_a_reflectivity_was_not_run(error: float, verdict: Verdict):
+    def measured(run: PlannedRun) -> float | None:
+        return None if run.parameters["reflectivity"] == "1.5" else 0.010 + error
 
-    claim = one(IrSensorCurve().claims(sensor_table(apparent_at_10_mm=unmeasured)), "With one curve")
-    assert claim.verdict is Verdict.NOT_COMPARABLE
+    claim = one(IrSensorCurve().claims(sensor_table(apparent_at_10_mm=measured)), "With one curve")
+    assert claim.verdict is verdict
     assert "1.5" in claim.reason
 
 
