@@ -267,7 +267,8 @@ def read_checkpoint(path: Path) -> Checkpoint:
                 warnings=header.warnings,
             )
     except FileNotFoundError as e:
-        raise InvalidCheckpoint(path, "there is no checkpoint; a run writes them with --checkpoint SECONDS") from e
+        how = "with --checkpoint SECONDS a run writes the first after that time"
+        raise InvalidCheckpoint(path, f"there is no checkpoint; {how}") from e
     except InvalidCheckpoint:
         raise
     except Exception as e:  # the readers of zip, JSON and states raise various exceptions on damaged bytes

@@ -371,7 +371,7 @@ def _built() -> Path:
     try:
         return cached("VslArm", 3)
     except OSError as e:
-        raise UsageError(f"the folder of built units cannot be used (HANDOVER_CACHE): {e}") from e
+        raise UsageError(f"the folder of built units cannot be used: {e}; HANDOVER_CACHE names another") from e
 
 
 def _check_file(option: str, out: Path, suffix: str) -> None:

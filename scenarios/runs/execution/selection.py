@@ -167,7 +167,7 @@ def select_fmus(
         except _invalid_blocks() as e:
             raise UsageError(f"unit {name}: {e}") from e
         except OSError as e:
-            raise UsageError(f"the folder of built units cannot be used (HANDOVER_CACHE): {e}") from e
+            raise UsageError(f"the folder of built units cannot be used: {e}; HANDOVER_CACHE names another") from e
     return fmus
 
 
