@@ -23,12 +23,12 @@ _ANGLE = np.arange(_DIRECTIONS) * 2.0 * np.pi / _DIRECTIONS
 _CIRCLE = np.column_stack([np.cos(_ANGLE), np.sin(_ANGLE)])
 _NEXT, _PREVIOUS = np.roll(np.arange(_DIRECTIONS), -1), np.roll(np.arange(_DIRECTIONS), 1)
 _FAR = np.arange(-7.5, 8.0, 1.5)  # px outwards of the outline; where colours are looked at for the end of green
-_NEAR = np.arange(-2.25, 2.5, 0.75)  # likewise for an exact edge; fingers are three times as broad
+_NEAR = np.arange(-2.25, 2.5, 0.75)  # px; where an exact edge is looked for: fingers are three times as broad
 _BESIDE = 2  # outermost samples on either side, whose mean is the colour there: blur does not reach so far
 _LEAST_GREEN = 0.2  # of green over blue and red, relative to green; what is less is another colour
 _DARKEST = 8.0  # level; noise hides what is darker
 _PURE = 0.06  # impurity at which an edge counts half; the usual noise alone makes 0.03
-_NOISY = 1.5  # likewise, over what the purest fourth of the edges has at most, where noise makes that more
+_NOISY = 1.5  # half-count impurity over that of the purest fourth of the edges, where noise makes this more
 _DARKER, _AT_DARKER = 0.7, 0.2  # brightness outside over green inside below which an edge counts less, and by how much
 
 

@@ -41,7 +41,7 @@ class ReflexGraspEvaluator(HandoverEvaluator):
     def __init__(self, parameters: Parameters, pictures: Sequence[CameraPicture] | None = None) -> None:
         super().__init__(parameters, pictures)
         self._p_GO_closing: Floats | None = None  # when the gripper began to close, the last time
-        self._believed: Floats | None = None  # likewise, by the controller
+        self._believed: Floats | None = None  # the same offset as the controller had it
 
     def __call__(self, t: float, signals: Signals) -> None:
         """Follow the handover, and note where the ball is as the gripper begins to close."""

@@ -2,7 +2,6 @@
 
 import contextlib
 import functools
-import os
 import signal
 import socket
 import threading
@@ -12,7 +11,7 @@ from typing import Any
 
 from handover.cosim.fmu.host_process import opened_file
 from handover.scenarios.runs.execution.exit_status import ABORTED
-from handover.scenarios.runs.execution.supervisor import leave
+from handover.scenarios.runs.execution.supervisor import leave, write_error_line
 
 _ENDING = [n for n in (signal.SIGTERM, getattr(signal, "SIGHUP", None)) if n is not None]
 """Signals that end a run after its step, as of a batch system or of a terminal that is closed."""
@@ -91,7 +90,7 @@ class Interruption:
         for undo in self._undo:
             undo()
         if self._aborted:
-            _say("Aborted!")
+            write_error_line("Aborted!")
             raise SystemExit(ABORTED) from None
 
     def _take(self, _number: int, _frame: FrameType | None) -> None:
@@ -118,9 +117,9 @@ class Interruption:
                 self._heard += 1
                 aborts = not self._running or self._heard > 1
                 if not aborts:
-                    _say("ending after this step; Ctrl-C again to abort")
+                    write_error_line("ending after this step; Ctrl-C again to abort")
                 elif not self._handled.wait(_GRACE):
-                    _say("Aborted! A unit did not return.")
+                    write_error_line("Aborted! A unit did not return.")
                     leave(ABORTED)
 
 
@@ -135,13 +134,3 @@ def _closing(end: socket.socket) -> Callable[[], None]:
             end.detach()
 
     return close
-
-
-def _say(line: str) -> None:
-    """Write to standard error past its buffer, which the signal may have interrupted; not if its terminal was closed.
-
-    On a terminal it begins a line, as ^C or a progress bar is on the one before.
-    """
-    begin = "\n" if os.isatty(2) else ""
-    with contextlib.suppress(OSError):
-        os.write(2, f"{begin}{line}\n".encode())

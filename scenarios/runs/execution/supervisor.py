@@ -145,6 +145,16 @@ def leave(status: int) -> NoReturn:
     os._exit(status)
 
 
+def write_error_line(line: str) -> None:
+    """Write a line to standard error past its buffer, which a signal may have interrupted; not if nobody can read it.
+
+    On a terminal, which may have been closed, it begins a line, as ^C or a progress bar is on the one before.
+    """
+    begin = "\n" if os.isatty(2) else ""
+    with contextlib.suppress(OSError):
+        os.write(2, f"{begin}{line}\n".encode())
+
+
 class _Asks:
     """How often a child was asked to end, and whether it was killed because it could not."""
 
@@ -155,12 +165,12 @@ class _Asks:
         self._count += 1
         if not self._child.stopped:
             return
-        line = "the run is stopped (SIGSTOP) and ends once it continues; the same signal again aborts it\n"
+        line = "the run is stopped (SIGSTOP) and ends once it continues; the same signal again aborts it"
         if self._count > 1:
-            self.aborted, line = True, "Aborted! The run was stopped (SIGSTOP).\n"
+            self.aborted, line = True, "Aborted! The run was stopped (SIGSTOP)."
             with contextlib.suppress(ProcessLookupError):
                 os.kill(self._child.pid, signal.SIGKILL)
-        os.write(2, line.encode())
+        write_error_line(line)
 
 
 def _forward_signals(child: ForkedChild) -> _Asks:
