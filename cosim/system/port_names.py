@@ -1,7 +1,7 @@
 """Units as they are placed in a system, connections, and their ends by name: a port, or all of one side."""
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any, NoReturn
 
@@ -15,10 +15,14 @@ BY_ENTRIES = "arrays are connected as a whole; to connect entries, put a block o
 
 @dataclass(frozen=True)
 class PortName:
-    """One end of a connection: a port of a unit in a system, or one of its terminals. It has no entries."""
+    """One end of a connection: a port of a unit in a system, or one of its terminals. It has no entries.
+
+    `system` is the number of the system whose unit it was taken from; None where it was made by names alone.
+    """
 
     unit: str
     port: str
+    system: int | None = field(default=None, compare=False, repr=False, kw_only=True)
 
     def __str__(self) -> str:
         return f"{self.unit}.{self.port}"
@@ -47,17 +51,18 @@ class PortNames:
     `System.connect(arm.y, camera.u)`.
     """
 
-    def __init__(self, unit: str, causality: Causality) -> None:
+    def __init__(self, unit: str, causality: Causality, system: int | None = None) -> None:
         self._unit = unit
         self._causality = causality
+        self._system = system
 
     def __getattr__(self, port: str) -> PortName:
         if port.startswith("__"):
             raise AttributeError(port)
-        return PortName(self._unit, port)
+        return PortName(self._unit, port, system=self._system)
 
     def __getitem__(self, port: str) -> PortName:
-        return PortName(self._unit, port)
+        return PortName(self._unit, port, system=self._system)
 
     def __repr__(self) -> str:
         return f"{self._unit}.{'y' if self._causality is Causality.OUTPUT else 'u'}"
@@ -67,7 +72,8 @@ class PortNames:
 class PlacedUnit:
     """A unit of a system: its FMU's description, its start values, and its communication step in seconds.
 
-    A sampled unit computes its outputs from the inputs at the instant at which a step begins.
+    A sampled unit computes its outputs from the inputs at the instant at which a step begins. `system` is the
+    number of the system that it was added to.
     """
 
     name: str
@@ -75,6 +81,7 @@ class PlacedUnit:
     start: Mapping[str, Any]
     period: Fraction
     sampled: bool
+    system: int | None = field(default=None, compare=False, repr=False)
 
     @property
     def uses_events(self) -> bool:
@@ -87,12 +94,12 @@ class PlacedUnit:
     @property
     def u(self) -> PortNames:
         """Its inputs, by attribute."""
-        return PortNames(self.name, Causality.INPUT)
+        return PortNames(self.name, Causality.INPUT, self.system)
 
     @property
     def y(self) -> PortNames:
         """Its outputs, by attribute."""
-        return PortNames(self.name, Causality.OUTPUT)
+        return PortNames(self.name, Causality.OUTPUT, self.system)
 
     def _repr_html_(self) -> str:
         from handover.cosim.fmu.file.port_table import description_html  # of notebooks alone
@@ -110,7 +117,7 @@ def check_end(end: Any, ports: str, units: Mapping[str, PlacedUnit]) -> None:
 
     Raises:
         TypeError: it is not a port, and not all outputs or inputs of a unit.
-        ValueError: it is all of a unit that the system does not have.
+        ValueError: it is of another system, or all of a unit that the system does not have.
     """
     if isinstance(end, PlacedUnit):
         right = f"{end.name}.{ports}, or {end.name}.{ports}.NAME for one port"
@@ -118,8 +125,21 @@ def check_end(end: Any, ports: str, units: Mapping[str, PlacedUnit]) -> None:
     if isinstance(end, PortNames):
         if (unit := vars(end)["_unit"]) not in units:
             raise ValueError(f"{end!r}: this system has no unit {unit!r}; {nearest(unit, units)}")
+        check_system(end, vars(end)["_system"], units[unit])
     elif not isinstance(end, PortName):
         raise TypeError(f"{end!r} is not a port: give unit.y.NAME and unit.u.NAME of what add returned")
+    else:
+        check_system(end, end.system, units.get(end.unit))
+
+
+def check_system(end: PortName | PortNames, system: int | None, unit: PlacedUnit | None) -> None:
+    """Check that a port, or all of a unit, is of a system's own unit of its name, where there is such a unit.
+
+    Raises:
+        ValueError: it was taken from another system.
+    """
+    if unit is not None and system not in (None, unit.system):
+        raise ValueError(f"{end!s} is of another System: give the port of what this system's add returned")
 
 
 def unit_of(ports: PortNames, causality: Causality) -> str:

@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from fractions import Fraction
+from itertools import count
 from numbers import Rational
 from os import PathLike
 from pathlib import Path
@@ -35,7 +36,16 @@ from handover.cosim.system.matching import (
     matched_ports_of_terminals,
     matches_of,
 )
-from handover.cosim.system.port_names import Connection, PlacedUnit, PortName, PortNames, ambiguity, check_end, unit_of
+from handover.cosim.system.port_names import (
+    Connection,
+    PlacedUnit,
+    PortName,
+    PortNames,
+    ambiguity,
+    check_end,
+    check_system,
+    unit_of,
+)
 from handover.cosim.system.time_series import ExternalSource, NoSource, TimeSeries
 from handover.cosim.system.wiring_faults import (
     clock_of,
@@ -47,6 +57,9 @@ from handover.cosim.system.wiring_faults import (
     value_faults,
 )
 from handover.cosim.typed_data import UNIT_NAME
+
+_NUMBERS = count()
+"""Of the systems of this process."""
 
 
 class System:
@@ -73,6 +86,7 @@ class System:
         self._presumed_steps: dict[str, str] = {}  # by unit, what its step was taken from
         self._tolerated: list[str] = []
         self._descriptions: dict[Path, FmuDescription] = {}
+        self._number = next(_NUMBERS)  # which its units and their ports have
 
     def add(
         self, name: str, fmu: Path | str | FmuDescription, *, period: Fraction | None = None,
@@ -99,7 +113,8 @@ class System:
         if name in self.units:
             self._faults.append(f"two units are called {name!r}")
         period = self._period(name, description.experiment, period)
-        unit = PlacedUnit(name, description, start, period, description.sampled if sampled is None else sampled)
+        is_sampled = description.sampled if sampled is None else sampled
+        unit = PlacedUnit(name, description, start, period, is_sampled, self._number)
         self.units[name] = unit
         return unit
 
@@ -161,7 +176,7 @@ class System:
         Raises:
             TypeError: an end is not a port, or not the outputs or inputs of a unit, or units or terminals are connected
                 with a transformation, which is for one connection.
-            ValueError: a whole unit is not of this system.
+            ValueError: an end is a port of another `System`, or a whole unit is not of this one.
         """
         for end, ports in ((source, "y"), (target, "u")):
             check_end(end, ports, self.units)
@@ -245,9 +260,10 @@ class System:
         """Remove the connections of a port, or of all ports of a terminal, and what they are set to or follow.
 
         Raises:
-            ValueError: the terminal has a fault, so that its ports are not known. TypeError: it is not a port.
+            ValueError: the terminal has a fault, so that its ports are not known, or it is of another `System`.
+            TypeError: it is not a port.
         """
-        _check_port(end, "unit.y.NAME or unit.u.NAME")
+        self._check_port(end, "unit.y.NAME or unit.u.NAME")
         if (found := self._terminal(end)) is None:
             self.disconnect_port(end)
             return
@@ -262,8 +278,9 @@ class System:
 
         Raises:
             TypeError: it is not a port.
+            ValueError: it is of another `System`.
         """
-        _check_port(end, "unit.y.NAME or unit.u.NAME")
+        self._check_port(end, "unit.y.NAME or unit.u.NAME")
         self._matches.pop(end, None)
         for matches in self._matches.values():
             matches[:] = [m for m in matches if m.source != end]
@@ -319,8 +336,9 @@ class System:
 
         Raises:
             TypeError: the target is not a port, or these are no values over time.
+            ValueError: it is a port of another `System`.
         """
-        _check_port(target)
+        self._check_port(target)
         if not isinstance(series, TimeSeries):  # type: ignore
             raise TypeError(f"{target} cannot follow {series!r:.60}: expected a TimeSeries, as of Record.series")
         self._forget_matches(target)
@@ -339,8 +357,9 @@ class System:
 
         Raises:
             TypeError: the target is not a port, or the source gives no values.
+            ValueError: it is a port of another `System`.
         """
-        _check_port(target)
+        self._check_port(target)
         if source is not None and not callable(getattr(source, "at", None)):
             raise TypeError(f"{target} cannot come from {source!r:.60}: expected an object with a method at(t)")
         self._forget_matches(target)
@@ -403,6 +422,11 @@ class System:
         """What is not as it should be with a checked system that can be run nonetheless; see `MasterOptions.strict`."""
         doubts = (connection_doubt(self.units, c) for c in self.connections)
         return [*self._presumed_steps.values(), *self._tolerated, *filter(None, doubts)]
+
+    @property
+    def remarks(self) -> list[str]:
+        """What who runs it, or writes it as a file, should know before: `tolerated`, `undefined_starts`, `notes`."""
+        return [*self.tolerated, *self.undefined_starts, *self.notes]
 
     @property
     def undefined_starts(self) -> list[str]:
@@ -469,6 +493,11 @@ class System:
         self._step_faults[name] = NoStep(name, reason)
         return Fraction(1, 100)  # any: `check` reports the fault, but more units can be added until then
 
+    def _check_port(self, end: object, right: str = "unit.u.NAME") -> None:
+        if not isinstance(end, PortName):
+            raise TypeError(f"{end!r:.60} is not a port: give {right} of what add returned")
+        check_system(end, end.system, self.units.get(end.unit))
+
     def _presume(self, name: str, step: Fraction, source: str) -> None:
         self._presumed_steps[name] = f"{name}: {NO_STEP}; {float(step):g} s is taken, {source}"
 
@@ -478,11 +507,6 @@ class System:
                 raise InvalidFmu(path, f"there is no such file; a unit of the catalog is handover.unit({str(path)!r})")
             self._descriptions[path] = describe_fmu(path)
         return self._descriptions[path]
-
-
-def _check_port(end: object, right: str = "unit.u.NAME") -> None:
-    if not isinstance(end, PortName):
-        raise TypeError(f"{end!r:.60} is not a port: give {right} of what add returned")
 
 
 def _ports_of(unit: str, ends: Iterable[PortName]) -> list[str]:

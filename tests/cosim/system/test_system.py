@@ -1,10 +1,12 @@
 """What is wrong with a system is found before anything starts, all at once."""
 
+from copy import copy
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from support.cosim.fmu_of import FmuOf
 from support.cosim.native_units import Edited, native_fmu
@@ -18,6 +20,7 @@ from handover.cosim.fmu.file.description import FmuPort, describe_fmu
 from handover.cosim.master.master import Master
 from handover.cosim.ssp.writing import write_ssp
 from handover.cosim.system.system import PortName, System
+from handover.cosim.system.time_series import TimeSeries
 from handover.cosim.system.wiring_faults import doubt, mismatch, obstacle
 from handover.cosim.typed_data import InvalidData, checked
 from handover.cosim.typed_data import PortName as ReadName
@@ -32,7 +35,7 @@ def faults_of(s: System) -> tuple[str, ...]:
 
 
 def test_all_faults_are_reported_at_once_with_what_is_valid(fmu: FmuOf, wording: Wording):
-    s, other = System(), System()
+    s = System()
     mass, spring = s.add("mass", fmu("Mass"), mas=1.0, m=-1.0), s.add("spring", fmu("Spring"), k="stiff")
     counter, echo = s.add("counter", fmu("Counter")), s.add("echo", fmu("Echo"))
     s.add("twice", fmu("Mass"), m=-1.0)
@@ -45,7 +48,7 @@ def test_all_faults_are_reported_at_once_with_what_is_valid(fmu: FmuOf, wording:
         (mass.y.x, spring.u.stretch),
         (mass.u.f, spring.u.x),  # ends
         (mass.y.x, spring.y.f),
-        (other.add("sprint", fmu("Spring")).y.f, spring.u.x),
+        (PortName("sprint", "f"), spring.u.x),
     ):
         s.connect(source, target)
     faults = faults_of(s)
@@ -182,6 +185,26 @@ def test_a_port_is_no_name_and_a_period_is_exact(fmu: FmuOf, wording: Wording):
     with pytest.raises(TypeError) as refused:
         s.add("mass", fmu("Mass"), period=inexact)
     wording.check(refused.value)
+
+
+def test_a_port_of_another_system_is_not_taken_for_this_ones_by_its_units_name(fmu: FmuOf):
+    s, other = System(), System()
+    own, theirs = (system.add("mass", fmu("Mass")) for system in (s, other))
+    for use in (
+        lambda: s.connect(theirs.y.x, own.u.f),
+        lambda: s.connect(own.y.x, theirs.u.f),
+        lambda: s.connect(theirs.y, own.u),
+        lambda: s.disconnect(theirs.u.f),
+        lambda: s.external(theirs.u.f),
+        lambda: s.follow(theirs.u.f, TimeSeries(np.zeros(1), np.ones((1, 1)), linear=True)),
+    ):
+        with pytest.raises(ValueError, match=r"another System"):
+            use()
+    assert not s.connections
+    assert not s.externals
+    assert not s.followed
+    copied = copy(s)
+    copied.connect(own.y.x, own.u.f)  # a copy has the same units
 
 
 def test_a_port_whose_name_is_no_identifier_is_named_by_key(edited: Edited):
