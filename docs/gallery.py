@@ -45,8 +45,8 @@ _OF_CAMPAIGNS = ("cli.paper", "cli.campaign", "published.catalog", "runs.campaig
 _POINTS: Mapping[str, Sequence[int]] = {
     "flyer-approaches": range(0, 500, 50),
     "flyer-controllers": (6, 8, 10, 74),
-    "flyer-handover": (0, 3),
-    "flyer-impedance": (0, 3, 6, 9),
+    "flyer-handover": (0, 3, 6, 9, 18, 21),
+    "flyer-impedance": range(12),
     "flyer-navigation": (0, 2),
     "flyer-stability": range(30, 45, 3),
     "flyer-study": (20, 28),
@@ -61,9 +61,9 @@ _POINTS: Mapping[str, Sequence[int]] = {
     "ir-convergence": range(0, 10, 2),
     "ir-limits": range(0, 125, 5),
     "ir-sensor": (9, 10, 11),
-    "ir-table": (0, 1, 2, 3, 20, 21, 22, 23),
-    "vsl-1": (1, 21, 26, 46, 51, 71),
-    "vsl-2": (0, 1, 2, 3, 108, 109),
+    "ir-table": range(40),
+    "vsl-1": range(75),
+    "vsl-2": (*range(12), 108, 109),
 }
 """Points of each experiment's plan that are run, once each: so few that all of them take some minutes of CPU."""
 

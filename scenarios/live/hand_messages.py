@@ -1,27 +1,6 @@
 """Samples of a hand as a page or a tracker sends them, and what is wrong with those that are none.
 
-A device connects to `ws://HOST:PORT/hand` of a live page, or of a study's, and sends texts, some sixty a second. Each
-is a JSON object:
-
-| member | value |
-|---|---|
-| `p_WH` | position of the middle of the palm in the world W, three numbers, m |
-| `q_WH` | orientation in W, a unit quaternion, scalar first: x along straight fingers, y to the thumb |
-| `angles` | the 14 joints, rad, 0 to pi/2: thumb 2, index, middle, ring and little finger 3 each, each from its base |
-| `closed` | whether the hand grasps; one of `closed` and `angles` will do, the other follows |
-| `stamp` | when the device saw that, s of any clock that goes forward |
-| `sent` | when it was sent, s of the same clock, if well after `stamp`, as where a picture is looked at first |
-| `device` | what it is, such as `"mouse"`; once is enough, it is kept with the run |
-
-The server answers first with `{"hand": {...}}`, where the hand is wanted as it stands, in the same members, and how far
-it goes (`centre`, `radius`, m); afterwards only with `{"refused": "why"}`, and the run goes on with the sample before.
-Of refusals for one reason, a device gets two a second at most; a live run's folder counts all, in inputs.json.
-Where no hand of the run can be led, the first answer is `{"refused": "why"}`, and the connection ends with 1008; where
-no run has begun yet, with 1013: it may be tried again.
-Whoever connects first leads the hand until the connection ends. A sample has 2000 characters at most. A message above
-the server's limit, 4 kB of `handover run --live`, 400 kB of `handover play` and 80 kB of a study, ends the connection
-with WebSocket's code 1009, whose reason says that limit; on live pages more than 2000 messages in a second end it with
-1008.
+The form of messages and answers is in `docs/guides/live.md`, "A tracker of your own".
 """
 
 import math
@@ -63,7 +42,7 @@ Stamp = Annotated[float, Meta(ge=-1e12, le=1e12)]
 
 @dataclass(frozen=True)
 class _SentSample:
-    """A sample as it came, see the table above."""
+    """A sample as it came; a text's members are these."""
 
     p_WH: tuple[float, float, float]
     q_WH: tuple[float, float, float, float]
