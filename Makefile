@@ -17,7 +17,7 @@ INSTALL := $(BIN)/python -m pip install --quiet --no-compile --constraint constr
 
 WHEELS := x86_64-linux aarch64-linux x86_64-windows x86_64-darwin aarch64-darwin
 
-.PHONY: demo test test-changed test-slow fuzz paper real-time platforms hosts lint bench wording docs pictures icons wheels install clean
+.PHONY: demo test test-changed test-slow mutations fuzz paper real-time platforms hosts lint bench wording docs pictures icons wheels install clean
 
 demo: $(VENV)/.installed
 	$(BIN)/handover run helix_handover
@@ -33,6 +33,10 @@ test: $(VENV)/.installed-test build/lint/handover
 # The default tests of what differs from a commit: make test-changed SINCE=main
 test-changed: $(VENV)/.installed-test
 	$(BIN)/python tests/support/changed.py $(SINCE) | xargs -r $(BIN)/python -m pytest -m $(DEFAULT)
+
+# How many of 60 changed operators the default tests kill, some 30 minutes: make mutations SEED=7
+mutations: $(VENV)/.installed-test
+	$(BIN)/python tests/support/mutations.py --seed $(or $(SEED),0) $(DEFAULT)
 
 test-slow: $(VENV)/.installed-test
 	$(BIN)/python -m pytest $(PARALLEL) -m slow
