@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from handover.scenarios.cli.options import trust_option
+from handover.scenarios.cli.options import PATH, trust_option
 from handover.scenarios.runs.execution.errors import UsageError, one_line_errors, require_extra
 from handover.scenarios.runs.execution.progress import doing, say
 from handover.scenarios.runs.results.run_folder import RunFolder, dated_folder
@@ -39,7 +39,7 @@ Settings in which the entries differ are listed, units and versions included.
 
 
 @click.command("compare", help=_HELP, short_help="Put campaigns, or runs, on one page: rates, metrics, tests, curves.")
-@click.argument("folders", metavar="DIR DIR...", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.argument("folders", metavar="DIR DIR...", nargs=-1, required=True, type=PATH)
 @click.option(
     "--name", "names", multiple=True, metavar="NAME", help="Name of each DIR, in their order.  [default: the folder's]"
 )
@@ -59,7 +59,7 @@ Settings in which the entries differ are listed, units and versions included.
 )
 @click.option(
     "--out",
-    type=click.Path(path_type=Path),
+    type=PATH,
     help="Folder for the comparison, a new or an empty one.  [default: one of its own in comparisons/]",
 )
 @trust_option

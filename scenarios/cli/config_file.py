@@ -25,7 +25,7 @@ from handover.fmus.build import is_of_cache
 from handover.fmus.catalog import UNITS
 from handover.scenarios.catalog import InvalidScenario, ScenarioSource, named_scenario
 from handover.scenarios.cli.master_options import CONTROL_FIELDS
-from handover.scenarios.cli.options import HeadedCommand
+from handover.scenarios.cli.options import PATH, HeadedCommand
 from handover.scenarios.experiment.parameters import InvalidParameter, idle_parameters
 from handover.scenarios.runs.execution.errors import UsageError
 from handover.scenarios.runs.execution.progress import say
@@ -127,7 +127,7 @@ def config_option(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add `--config`, to a `ConfiguredCommand`."""
     return click.option(
         "--config",
-        type=click.Path(path_type=Path),
+        type=PATH,
         metavar="FILE",
         is_eager=True,
         expose_value=False,
@@ -153,6 +153,8 @@ def read_config(path: Path, ctx: click.Context) -> ConfigFile:
         UsageError: it cannot be read, or with all keys that are unknown or whose values are not right.
     """
     content = _content(path)
+    if path.name == "summary.json" and (run_file := path.with_name("run.json")).is_file():
+        raise UsageError(f"{path}: it has a run's results and no options; {run_file} repeats the run")
     options = dict(_options(ctx.command))
     tables = {key: name for key, name in _TABLES.items() if name in {p.name for p in ctx.command.params}}
     run: Mapping[str, Any] | None = None

@@ -12,7 +12,7 @@ from handover.cosim.ssp.writing import bound_enumerations, write_ssp
 from handover.cosim.system.system import System
 from handover.fmus.build import cached
 from handover.fmus.contents.fmi2_description import NoFmi2Form
-from handover.scenarios.cli.options import check_new_file, refused_if_taken, scenario_options
+from handover.scenarios.cli.options import PATH, check_new_file, refused_if_taken, scenario_options
 from handover.scenarios.experiment.parameters import check_effects
 from handover.scenarios.runs.execution.errors import UsageError, one_line_errors
 from handover.scenarios.runs.execution.interruption import Interruption
@@ -36,7 +36,7 @@ tools do not take there, are start values of the FMUs.
     context_settings={"show_default": True},
 )
 @click.argument("scenario")
-@click.option("--ssp", "file", required=True, type=click.Path(path_type=Path), metavar="FILE", help="File to write.")
+@click.option("--ssp", "file", required=True, type=PATH, metavar="FILE", help="File to write.")
 @click.option("--force", is_flag=True, help="Replace FILE if it is there.")
 @scenario_options
 def export_command(
@@ -64,7 +64,7 @@ def export_command(
                 write_ssp(system, file, experiment.name, stop, instance.step_in_parallel(values), replace=force)
         except OSError as e:
             raise UsageError(f"--ssp {file}: it cannot be written: {e.strerror}") from e
-        for line in system.notes:
+        for line in system.remarks:
             say(line)
     click.echo(file)
 

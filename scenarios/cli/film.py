@@ -11,7 +11,7 @@ import click
 from rich.progress import BarColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from handover.cosim.exceptions import counted
-from handover.scenarios.cli.options import FiniteRange, check_new_file, refused_if_taken, trust_option
+from handover.scenarios.cli.options import PATH, FiniteRange, check_new_file, refused_if_taken, trust_option
 from handover.scenarios.pages.film import LARGEST, SMALLEST
 from handover.scenarios.runs.campaign.folder import OF_NEITHER, CampaignFolder
 from handover.scenarios.runs.execution.errors import FilmFailed, UsageError, one_line_errors, require_extra
@@ -49,10 +49,8 @@ class Size(click.ParamType):  # type: ignore (generic in newer versions only)
 
 
 @click.command("film", help=_HELP, short_help="Make a film of a run: its scene beside plots.")
-@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
-@click.option(
-    "--out", "file", metavar="FILE", type=click.Path(path_type=Path), help="The film.  [default: DIR/film.mp4]"
-)
+@click.argument("folder", metavar="DIR", type=PATH)
+@click.option("--out", "file", metavar="FILE", type=PATH, help="The film.  [default: DIR/film.mp4]")
 @click.option("--force", is_flag=True, help="Replace FILE if it is there.")
 @click.option(
     "--plot",

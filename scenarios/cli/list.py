@@ -30,6 +30,7 @@ from handover.scenarios.catalog import (
     search_folder,
 )
 from handover.scenarios.cli.console import open_console, print_json, print_rows
+from handover.scenarios.cli.options import PATH
 from handover.scenarios.cli.summaries.port_tables import allowed, plain, port_rows, type_of, variable_data
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.places import PlacePort, ports_of_place
@@ -52,7 +53,7 @@ from handover.scenarios.runs.results.run_folder import check_place
     "--html",
     "page",
     metavar="FILE",
-    type=click.Path(path_type=Path),
+    type=PATH,
     help="Write all units with icons, parameters and ports into a page that opens offline, or replace it.",
 )
 def list_command(name: str | None, place: str | None, page: Path | None, *, as_json: bool) -> None:

@@ -103,6 +103,20 @@ class FiniteRange(click.FloatRange):
         return number
 
 
+class _PathName(click.Path):
+    """A path; "" is none, which `pathlib` takes for the working directory."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the path."""
+        if value == "":
+            self.fail("it is empty; give a path", param, ctx)
+        return super().convert(value, param, ctx)
+
+
+PATH = _PathName(path_type=Path)
+"""The path of a file or folder, for options and arguments."""
+
+
 class WholeNumber(click.IntRange):
     """A whole number in a range."""
 
@@ -202,7 +216,7 @@ def _trust(ctx: click.Context, _option: click.Parameter, files: Sequence[Path]) 
 trust_option = click.option(
     "--trust",
     multiple=True,
-    type=click.Path(path_type=Path),
+    type=PATH,
     metavar="FILE.py",
     expose_value=False,
     callback=_trust,
@@ -262,7 +276,7 @@ _worker_option = partial(click.option, cls=HeadedOption, heading="Workers")
 _CAMPAIGN_OPTIONS = (
     click.option(
         "--out",
-        type=click.Path(path_type=Path),
+        type=PATH,
         help="Folder of the campaign; one that is there is resumed.  [default: one of its own in campaigns/]",
     ),
     click.option("--no-report", is_flag=True, help="Write no report page at the end."),

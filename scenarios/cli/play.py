@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from handover.cosim.exceptions import counted
-from handover.scenarios.cli.options import FiniteRange, HeadedCommand, scenario_options, stop_option
+from handover.scenarios.cli.options import PATH, FiniteRange, HeadedCommand, scenario_options, stop_option
 from handover.scenarios.cli.run import file_options
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.runs.execution.errors import UsageError, one_line_errors, require_extra
+from handover.scenarios.runs.execution.interruption import Interruption
 from handover.scenarios.runs.execution.progress import say
 from handover.scenarios.runs.execution.request import RUNS, RunRequest
 from handover.scenarios.runs.results.run_folder import RunFolder, dated_folder
@@ -49,7 +50,7 @@ parameters, whose values they keep unless --input says others. Ctrl-C ends the s
 )
 @click.option(
     "--out",
-    type=click.Path(path_type=Path),
+    type=PATH,
     help="Folder in which the runs' folders are made.  [default: one of its own in runs/]",
 )
 @click.help_option("-h", "--help")
@@ -71,7 +72,7 @@ def play(
     require_extra("reports", "handover play")
     require_extra("live", "handover play")
     with contextlib.ExitStack() as made:
-        with one_line_errors(), contextlib.ExitStack() as opened:
+        with Interruption(), one_line_errors(), contextlib.ExitStack() as opened:
             request = RunRequest(
                 subject=scenario,
                 parameters=parameters,
@@ -86,8 +87,8 @@ def play(
             request.check_options()
             subject = request.open(opened)
             asked = subject.experiment
-            for line in request.system(subject, seed, request.fmus(asked)).tolerated:
-                click.echo(line, err=True)
+            for line in request.system(subject, seed, request.fmus(asked)).remarks:
+                say(line)
             folder = RunFolder(out or made.enter_context(dated_folder(RUNS, f"{Path(asked.name).stem}_play")))
             options = _options(replaced, {"--start": start, "--stop": stop, "--step": step, "--input": inputs})
             session = _session(request, asked, subject.parameters, options, folder.claim(made).shown, pace)

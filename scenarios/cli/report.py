@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from handover.scenarios.cli.options import page_to_write, trust_option
+from handover.scenarios.cli.options import PATH, page_to_write, trust_option
 from handover.scenarios.runs.campaign.folder import OF_NEITHER, CampaignFolder
 from handover.scenarios.runs.execution.errors import UsageError, one_line_errors, require_extra
 from handover.scenarios.runs.execution.progress import doing, say
@@ -20,7 +20,7 @@ With --runs, each run of a campaign gets its page, too, to which the campaign's 
 
 
 @click.command("report", help=_HELP, short_help="Write the page of a run or of a campaign.")
-@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+@click.argument("folder", metavar="DIR", type=PATH)
 @trust_option
 @click.option("--figures", is_flag=True, help="Draw the figures again, too, as PNG and SVG, into DIR/figures.")
 @click.option("--runs", is_flag=True, help="Write the pages of a campaign's runs, too, into DIR/runs/NAME.")
@@ -28,7 +28,7 @@ With --runs, each run of a campaign gets its page, too, to which the campaign's 
     "--out",
     "file",
     metavar="FILE",
-    type=click.Path(path_type=Path),
+    type=PATH,
     help="The page, a name that ends with .html; a file of that name is replaced.  [default: DIR/report.html]",
 )
 def report(folder: Path, figures: bool, runs: bool, file: Path | None) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 
 from handover.scenarios.cli.master_options import isolate_option, isolated
-from handover.scenarios.cli.options import limit_options, limits, log_option
+from handover.scenarios.cli.options import PATH, limit_options, limits, log_option
 from handover.scenarios.cli.summaries.run import RunEnding
 from handover.scenarios.runs.campaign.folder import CampaignFolder
 from handover.scenarios.runs.execution.errors import UsageError, one_line_errors, require_extra
@@ -33,7 +33,7 @@ folder is somebody else's, see that the code is yours.
 
 
 @click.command("resume", help=_HELP, short_help="Resume a run from its last checkpoint.")
-@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+@click.argument("folder", metavar="DIR", type=PATH)
 @click.option("--no-report", is_flag=True, help="Write neither figures nor a report: `handover report` can, later.")
 @isolate_option
 @log_option

@@ -19,6 +19,7 @@ from handover.scenarios.cli.config_file import ConfiguredCommand, config_option
 from handover.scenarios.cli.console import reserve_stdout
 from handover.scenarios.cli.master_options import coupling_of, master_options
 from handover.scenarios.cli.options import (
+    PATH,
     HeadedOption,
     Instant,
     Seconds,
@@ -57,7 +58,7 @@ _START = _option(
 _INPUT = _option(
     "--input",
     "inputs",
-    type=click.Path(path_type=Path),
+    type=PATH,
     metavar="FILE.csv",
     help="Of an FMU: inputs over time, a column `time` and columns by input's name, in the inputs' units; continuous"
     " reals lie on lines between two times, all else is held.  [default: constant at their start values]",
@@ -99,9 +100,7 @@ recorded_option = _record_option(
 @scenario_options
 @stop_option
 @log_option
-@click.option(
-    "--out", type=click.Path(path_type=Path), help="Folder for the results.  [default: one of its own in runs/]"
-)
+@click.option("--out", type=PATH, help="Folder for the results.  [default: one of its own in runs/]")
 @click.option("--no-report", is_flag=True, help="Write neither figures nor a report: `handover report` can, later.")
 @click.option(
     "--strict",
@@ -122,15 +121,15 @@ recorded_option = _record_option(
 )
 @click.option(
     "--webcam",
-    type=click.Path(path_type=Path),
+    type=PATH,
     metavar="FOLDER",
     help="Let a webcam lead the hand in the page of --live, by MediaPipe: the unpacked npm package"
     " @mediapipe/tasks-vision with the model hand_landmarker.task in it.  [default: not offered]",
 )
-@click.option("--controls", type=click.Path(path_type=Path), hidden=True, help="Folder of a process that controls it.")
+@click.option("--controls", type=PATH, hidden=True, help="Folder of a process that controls it.")
 @click.option(
     "--inputs-from",
-    type=click.Path(path_type=Path),
+    type=PATH,
     metavar="RUN",
     help="Folder of a run whose inputs from outside, such as a hand's, are played back: the same run once more, or"
     " another robot that meets the same hand.",

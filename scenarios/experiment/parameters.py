@@ -12,6 +12,8 @@ from handover.cosim.exceptions import MOST_FAULTS, counted, first_faults, neares
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.needs import Need, needs_of
 
+_SEEDS = "a run's seed is given by --seed, a sweep's runs of several seeds by --repeat"
+
 
 class UnknownParameter(str):
     """The fault of a name that is not a parameter's, with the nearest of theirs; `name` is the name."""
@@ -20,7 +22,8 @@ class UnknownParameter(str):
 
     def __new__(cls, what: str, name: str, known: Iterable[str]) -> "UnknownParameter":
         """Return it: what has no parameter, up to the name."""
-        fault = super().__new__(cls, f"{what} {short_repr(name)}; {nearest(name, known)}")
+        near = _SEEDS if name == "seed" else nearest(name, known)
+        fault = super().__new__(cls, f"{what} {short_repr(name)}; {near}")
         fault.name = name
         return fault
 

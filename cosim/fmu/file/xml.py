@@ -198,7 +198,8 @@ def check_xml(content: bytes, watch: Callable[[Any], None] | None = None) -> Non
     except UnsafeXml:
         raise
     except ParseError as e:
-        raise UnsafeXml(f"it is not well-formed: {e}") from e
+        reason = str(e).replace("not well-formed (invalid token)", "invalid token")
+        raise UnsafeXml(f"it is not well-formed: {reason}") from e
     except defusedxml.DTDForbidden as e:
         raise UnsafeXml(
             "it has a document type (<!DOCTYPE ...>), in which entities could be declared that exhaust memory or "

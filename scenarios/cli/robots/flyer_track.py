@@ -4,18 +4,18 @@ from pathlib import Path
 
 import click
 
+from handover.scenarios.cli.options import PATH
 from handover.scenarios.runs.execution.errors import UsageError, one_line_errors
 from handover.scenarios.runs.results.run_folder import RunFolder, check_place, make_folder_of, replacing
 
-_PATH = click.Path(path_type=Path)
 _SIGNALS = ("person.p_WH_goal", "person.q_WH_goal", "person.finger_goal", "person.closed_goal")
 
 
 @click.command("flyer-track")
-@click.argument("folder", metavar="DIR", type=_PATH)
+@click.argument("folder", metavar="DIR", type=PATH)
 @click.option(
     "--out",
-    type=_PATH,
+    type=PATH,
     default=Path("hand_track.csv"),
     show_default=True,
     help="File for the track; one of that name is replaced.",

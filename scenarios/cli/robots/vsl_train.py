@@ -23,7 +23,7 @@ from handover.cosim.exceptions import CosimError, UnitFailure, nearest
 from handover.fmus.binaries import NotCompiled
 from handover.fmus.build import cached
 from handover.fmus.compile import CompilationError, UnknownPlatform
-from handover.scenarios.cli.options import SEED, WholeNumber
+from handover.scenarios.cli.options import PATH, SEED, WholeNumber
 from handover.scenarios.robots.vsl.data_file import InvalidData, read_data, write_data
 from handover.scenarios.robots.vsl.learning_curve import curve_table, draw_curve, learning_curve
 from handover.scenarios.robots.vsl.residuals import Errors
@@ -39,8 +39,6 @@ from handover.scenarios.runs.results.run_folder import (
     replacing,
     write_whole,
 )
-
-_PATH = click.Path(path_type=Path)
 
 _MIN_ADAPTATION = 20
 """Number of points below which the eleven weights of an adaptation are not worth fitting (assumed)."""
@@ -79,7 +77,7 @@ class _ArmFailed(click.ClickException):
     help="Seed of all random numbers [default: 0; with --adapt the next after that of the model's points].",
 )
 @click.option("--elbow", type=_ELBOW, default="up", help="Which way the elbow points.")
-@click.option("--plant", type=_PATH, help="FMU of the arm [default: VslArm, built from its sources].")
+@click.option("--plant", type=PATH, help="FMU of the arm [default: VslArm, built from its sources].")
 @click.option(
     "--arm",
     multiple=True,
@@ -94,12 +92,12 @@ class _ArmFailed(click.ClickException):
     "--friction-compensation", is_flag=True, help="Learn the friction of the gears by the direction of motion, too."
 )
 @click.option("--epochs", type=WholeNumber(min=1, max=100_000), default=EPOCHS, help="Passes of a published network.")
-@click.option("--data", type=_PATH, help="Train from the points of this Parquet file in place of measuring.")
-@click.option("--save-data", type=_PATH, help="Parquet file for the measured points.")
-@click.option("--curve", type=_PATH, help="PNG file for the errors by number of points; an SVG beside it; and a table.")
-@click.option("--adapt", type=_PATH, help="Adapt this model to an arm that differs, by few points.")
+@click.option("--data", type=PATH, help="Train from the points of this Parquet file in place of measuring.")
+@click.option("--save-data", type=PATH, help="Parquet file for the measured points.")
+@click.option("--curve", type=PATH, help="PNG file for the errors by number of points; an SVG beside it; and a table.")
+@click.option("--adapt", type=PATH, help="Adapt this model to an arm that differs, by few points.")
 @click.option(
-    "--out", type=_PATH, default=Path("vsl_model.json"), help="File for the model; one of that name is replaced."
+    "--out", type=PATH, default=Path("vsl_model.json"), help="File for the model; one of that name is replaced."
 )
 @click.pass_context
 def vsl_train(context: click.Context, **given: Any) -> None:

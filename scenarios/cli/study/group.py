@@ -10,6 +10,7 @@ from handover.cosim.exceptions import counted, first_faults
 from handover.cosim.files import FileTaken
 from handover.scenarios.cli.command import DeferredCommand, DeferringGroup
 from handover.scenarios.cli.console import open_console, print_json, print_rows
+from handover.scenarios.cli.options import PATH
 from handover.scenarios.runs.execution.errors import UsageError, one_line_errors
 from handover.scenarios.runs.execution.progress import say
 from handover.scenarios.runs.results.run_folder import check_place, make_folder_of, write_whole
@@ -77,7 +78,7 @@ def study() -> None:
 
 
 @study.command("new", short_help="Write the plan of the thesis's study, to start from.")
-@click.argument("file", metavar="PLAN.toml", type=click.Path(path_type=Path))
+@click.argument("file", metavar="PLAN.toml", type=PATH)
 def new(file: Path) -> None:
     """Write the plan of the thesis's study to PLAN.toml, to start from: tasks, behaviours, all that people read.
 
@@ -99,7 +100,7 @@ def new(file: Path) -> None:
 
 
 @study.command("plan", short_help="Check a plan, and show who plays what in which order.")
-@click.argument("file", metavar="PLAN.toml", type=click.Path(path_type=Path))
+@click.argument("file", metavar="PLAN.toml", type=PATH)
 @click.option("--participants", type=click.IntRange(1, 999), metavar="N", help="So many.  [default: the plan's]")
 @click.option("--json", "as_json", is_flag=True, help="Print it as JSON, with the seed of every round.")
 def plan(file: Path, participants: int | None, *, as_json: bool) -> None:

@@ -8,7 +8,7 @@ import click
 from rich.table import Table
 
 from handover.scenarios.cli.console import open_console, print_json
-from handover.scenarios.cli.options import SEED, FiniteRange
+from handover.scenarios.cli.options import PATH, SEED, FiniteRange
 from handover.scenarios.cli.study.group import checked_plan
 from handover.scenarios.runs.execution.errors import UsageError, one_line_errors, require_extra
 
@@ -48,7 +48,7 @@ _MOST = 200
 
 
 @click.command("power", help=_HELP, short_help="Simulate what a planned study could find.")
-@click.argument("file", metavar="PLAN.toml", type=click.Path(path_type=Path))
+@click.argument("file", metavar="PLAN.toml", type=PATH)
 @click.option(
     "--effect",
     type=FiniteRange(min=0),

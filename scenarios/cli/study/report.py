@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from handover.cosim.exceptions import visible
-from handover.scenarios.cli.options import page_to_write
+from handover.scenarios.cli.options import PATH, page_to_write
 from handover.scenarios.runs.execution.errors import UsageError, one_line_errors, require_extra
 from handover.scenarios.runs.execution.progress import doing, say
 from handover.scenarios.runs.results.run_folder import RunFolder, check_place
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from handover.scenarios.study.folder.study_folder import StudyFolder
     from handover.scenarios.study.plan.order import Round
 
-_FOLDER = click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+_FOLDER = click.argument("folder", metavar="DIR", type=PATH)
 
 
 @click.command("report", short_help="Write the page of a study, and all its tables.")
@@ -27,7 +27,7 @@ _FOLDER = click.argument("folder", metavar="DIR", type=click.Path(path_type=Path
     "--out",
     "file",
     metavar="FILE",
-    type=click.Path(path_type=Path),
+    type=PATH,
     help="The page, a name that ends with .html; a file of that name is replaced.  [default: DIR/report.html]",
 )
 def report(folder: Path, file: Path | None) -> None:

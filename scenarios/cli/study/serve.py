@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from handover.scenarios.cli.options import FiniteRange
+from handover.scenarios.cli.options import PATH, FiniteRange
 from handover.scenarios.runs.execution.errors import UsageError, one_line_errors, require_extra
 from handover.scenarios.runs.execution.progress import say
 
@@ -25,8 +25,8 @@ the hand by what the page shows.
 
 
 @click.command("serve", help=_HELP, short_help="Carry out a study: the page that people take part in.")
-@click.argument("file", metavar="PLAN.toml", type=click.Path(path_type=Path))
-@click.option("--out", required=True, type=click.Path(path_type=Path), metavar="DIR", help="Folder of the study.")
+@click.argument("file", metavar="PLAN.toml", type=PATH)
+@click.option("--out", required=True, type=PATH, metavar="DIR", help="Folder of the study.")
 @click.option("--host", default="127.0.0.1", show_default=True, metavar="ADDRESS", help="Address that it listens on.")
 @click.option("--port", type=click.IntRange(0, 65535), default=0, help="Port.  [default: one that is free]")
 @click.option(
@@ -38,7 +38,7 @@ the hand by what the page shows.
 @click.option(
     "--webcam",
     "webcam_folder",
-    type=click.Path(path_type=Path),
+    type=PATH,
     metavar="FOLDER",
     help="Offer the plan's device webcam, by MediaPipe: the unpacked npm package @mediapipe/tasks-vision with the model"
     " hand_landmarker.task in it.  [default: not offered]",

@@ -30,6 +30,7 @@ from handover.fmus.layout import DuplicateName
 from handover.fmus.sources import FileElsewhere, beside_block, closure
 from handover.fmus.standalone.freezer import CannotFreeze, check_standalone
 from handover.scenarios.catalog import search_folder
+from handover.scenarios.cli.options import PATH
 from handover.scenarios.experiment.parameter_sets import parameter_sets
 from handover.scenarios.runs.execution.errors import UsageError, one_line_errors
 from handover.scenarios.runs.execution.interruption import Interruption
@@ -103,7 +104,7 @@ Environment, when a tool loads the units
 )
 @click.option(
     "--out",
-    type=click.Path(path_type=Path),
+    type=PATH,
     default=Path("fmus-built"),
     show_default=True,
     help="Folder for the files; those of the same names are replaced.",
@@ -129,7 +130,7 @@ Environment, when a tool loads the units
 )
 @click.option(
     "--include",
-    type=click.Path(path_type=Path),
+    type=PATH,
     multiple=True,
     help="Data file that a unit of your own opens beside its module, by __file__.",
 )
@@ -140,7 +141,7 @@ Environment, when a tool loads the units
 )
 @click.option(
     "--stimulus",
-    type=click.Path(path_type=Path),
+    type=PATH,
     metavar="FILE",
     help="Stimulus of --prove for one UNIT: CSV with columns time (s) and inputs, such as p_WG[1]. "
     "Values are held until the next row.  [default: steps and ramps of the inputs that have a unit or a range]",

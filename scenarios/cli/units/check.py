@@ -17,6 +17,7 @@ from handover.cosim.fmu.file.archive import NO_FILE_FAULT
 from handover.cosim.probe.finding import Finding, Level
 from handover.cosim.ssp.check_ssp import check_ssp
 from handover.scenarios.cli.console import open_console
+from handover.scenarios.cli.options import PATH
 from handover.scenarios.runs.execution.errors import UsageError
 from handover.scenarios.runs.execution.fmu_run import is_fmu
 from handover.scenarios.runs.execution.progress import doing
@@ -44,7 +45,7 @@ Exit status
 
 
 @click.command("check", help=_HELP, short_help="Find what is wrong with FMUs and SSPs, whoever made them.")
-@click.argument("files", nargs=-1, required=True, metavar="FILE...", type=click.Path(path_type=Path))
+@click.argument("files", nargs=-1, required=True, metavar="FILE...", type=PATH)
 @click.option(
     "--timeout",
     type=click.FloatRange(min=0, min_open=True),
@@ -65,6 +66,8 @@ def check(files: Sequence[Path], timeout: float, as_json: bool) -> None:
                 _print_report(report)
     if as_json:
         click.echo(json.dumps([r.as_json() for r in reports], indent=2))
+    elif len(reports) > 1:
+        open_console().print(_overall(reports), soft_wrap=True)
     sys.exit(0 if all(r.passed for r in reports) else _FAULTS)
 
 
@@ -133,6 +136,13 @@ def _print_indented(mark: str, text: Text, width: int) -> None:
         console.print(row)
     else:
         console.print(Text(" " * width + mark) + text, soft_wrap=True)
+
+
+def _overall(reports: Sequence[CheckReport]) -> Text:
+    faulty = [r.path.name for r in reports if not r.passed]
+    if not faulty:
+        return Text.assemble(("no faults", "green"), f" in all {len(reports)}")
+    return Text.assemble(("faults", "bold red"), f" in {len(faulty)} of {len(reports)}: {', '.join(faulty)}")
 
 
 def _verdict(report: CheckReport) -> Text:

@@ -14,6 +14,7 @@ from handover.cosim.fmu.file.terminals import FmuTerminal
 from handover.cosim.ssp.ssp_file import SspFile
 from handover.cosim.system.system import System
 from handover.scenarios.cli.console import open_console, print_json, print_rows
+from handover.scenarios.cli.options import PATH
 from handover.scenarios.cli.summaries.port_tables import port_rows, variable_data
 from handover.scenarios.runs.execution.errors import UsageError, one_line_errors
 from handover.scenarios.runs.execution.fmu_run import is_fmu
@@ -38,7 +39,7 @@ _CAPABILITIES = {
 
 
 @click.command("info", help=_HELP, short_help="Show what is in an FMU or an SSP, from any tool.")
-@click.argument("file", type=click.Path(path_type=Path), metavar="FILE.fmu|FILE.ssp")
+@click.argument("file", type=PATH, metavar="FILE.fmu|FILE.ssp")
 @click.option("--json", "as_json", is_flag=True, help="Print it as JSON, for programs.")
 def info(file: Path, *, as_json: bool) -> None:
     """Show what is in an FMU or an SSP."""

@@ -12,6 +12,7 @@ import click
 from handover.cosim.files import FileTaken
 from handover.fmus.catalog import UNITS
 from handover.scenarios.catalog import SCENARIOS
+from handover.scenarios.cli.options import PATH
 from handover.scenarios.cli.units.place_start import start_for
 from handover.scenarios.runs.execution.errors import UsageError, one_line_errors
 from handover.scenarios.runs.execution.progress import say
@@ -39,9 +40,7 @@ Examples
 @click.command("new", help=_HELP, short_help="Write a start for a unit, a controller or a scenario of your own.")
 @click.argument("kind", type=click.Choice(["unit", "controller", "scenario"]))
 @click.argument("name")
-@click.option(
-    "--out", type=click.Path(path_type=Path), default=Path("."), help="Folder for the files.  [default: this one]"
-)
+@click.option("--out", type=PATH, default=Path("."), help="Folder for the files.  [default: this one]")
 @click.option("--for", "place", metavar="SCENARIO:PLACE", help="Of a unit or controller: with the ports of that place.")
 def new(kind: str, name: str, out: Path, place: str | None) -> None:
     """Write a working start for a unit, a controller or a scenario."""

@@ -123,7 +123,7 @@ def replacements(experiment: type[Experiment[Any]], given: Sequence[str]) -> dic
     for text in given:
         name, equals, other = text.partition("=")
         if not equals or not other:
-            raise UsageError(f"--unit {text!r} is not of the form NAME=FILE or NAME=MODULE:CLASS")
+            raise UsageError(f"--unit {text!r} is not of the form NAME=FILE, NAME=UNIT or NAME=MODULE:CLASS")
         if name not in experiment.units:
             raise UsageError(f"{experiment.name} has no unit {name!r}: {nearest(name, experiment.units)}")
         if name in others:

@@ -129,7 +129,7 @@ class RunFolder:
         Raises:
             InvalidRunFolder: another run has claimed it, or it cannot be made.
         """
-        self._claim.enter_context(folder_claimed(self.path, "another run has begun in it"))
+        self._claim.enter_context(folder_claimed(self.path, "another command is about to write into it"))
         opened.push(self._claim)
         self._check_empty()
         return self

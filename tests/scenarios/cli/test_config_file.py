@@ -163,6 +163,10 @@ def test_a_run_s_run_json_repeats_it_byte_for_byte(first: Path, tmp_path: Path):
     assert data["units"]["scene"]["fmu"] == "GraspScene.fmi2.fmu"
 
 
+def test_a_run_s_results_are_no_options_and_the_file_that_has_them_is_named(first: Path):
+    assert str(first / "run.json") in refusal("run", "--config", first / "summary.json")
+
+
 def test_it_can_be_changed_by_the_command_line_and_be_swept(first: Path):
     options = ["--config", str(first / "run.json")]
     got = sweep_command.make_context("sweep", [*options, "forward=0.03,0.1", "--seed", "9"]).params

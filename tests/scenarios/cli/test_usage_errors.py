@@ -54,6 +54,7 @@ run helix_handover --unit arm=unclosed.fmu
 run helix_handover --unit arm=hand.fmu
 run helix_handover --unit arm=TendonArmFst
 run helix_handover --out a
+run helix_handover --out ""
 run ir_grasp --step 1
 run ir_grasp --start 0
 run ir_grasp --stop 0
@@ -157,6 +158,7 @@ sweep x.ssp
 sweep x.fmu a=1,2
 sweep x.fmu --seed 3 --unit a=b
 sweep ir_grasp --step 0.1
+sweep ir_grasp seed=1,2
 sweep ir_grasp --isolate hand
 sweep ir_grasp shift_least=0.01,0.06
 sweep ir_grasp -p strategy=reflex,blind
