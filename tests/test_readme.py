@@ -97,8 +97,8 @@ def test_a_unit_runs_in_fmpy(folder: Path, monkeypatch: pytest.MonkeyPatch):
 
 
 def test_a_unit_tells_its_terminals(folder: Path):
-    told = succeeded(command_with(" info "), folder)
-    listed = [line.split()[0] for line in told.partition("\nTerminals")[2].splitlines() if line]
+    reported = succeeded(command_with(" info "), folder)
+    listed = [line.split()[0] for line in reported.partition("\nTerminals")[2].splitlines() if line]
     assert listed == ["wrist", "gripper", "actuators"]
 
 

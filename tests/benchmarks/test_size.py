@@ -13,7 +13,7 @@ import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 from support.benchmarks.large_systems import write_large_fmu, write_large_ssp
 
-pytest.importorskip("resource", reason="memory is told on Linux and macOS only")
+pytest.importorskip("resource", reason="memory is reported on Linux and macOS only")
 
 SIZES = (1_000, 3_000, 10_000)
 SECONDS, BYTES = 60.0, 2 << 30

@@ -47,7 +47,7 @@ def test_detection(benchmark: BenchmarkFixture, detector: Detector, eyes: str):
     benchmark.pedantic(poses, rounds=1)
     print(f"\n{detector.name.lower()}, {eyes}: median CPU {np.median(tracking):.1f} ms of a pair whose predecessor was "
           f"seen, {np.median(searching):.1f} ms of a first one")  # fmt: skip
-    benchmark.extra_info.update(found.told())
+    benchmark.extra_info.update(found.reported())
     assert len(found.errors["wrist"]) > 80
     assert len(found.errors["ball"]) > 80 or (detector, eyes) == (Detector.PUBLISHED, "left")
 
@@ -72,7 +72,7 @@ class Found:
                 self.errors[name].append(e)
                 self.squares[name].append(float(e @ np.linalg.solve(cov, e)))
 
-    def told(self) -> dict[str, float]:
+    def reported(self) -> dict[str, float]:
         """Print a table; return the RMS errors in mm."""
         print(f"{'':8} {'seen':>9} {'RMS':>7} {'median':>7} {'95 %':>7} {'most':>7} mm  e^T C^-1 e")
         rms: dict[str, float] = {}

@@ -26,10 +26,10 @@ def test_code_and_modules_import_what_this_process_does_wherever_they_are_called
     for folder in ("handover", "handover/cosim"):
         (tmp_path / folder).mkdir()
         (tmp_path / folder / "__init__.py").write_text("", encoding="utf-8")
-    (tmp_path / "told.py").write_text(IMPORTED, encoding="utf-8")
+    (tmp_path / "reported.py").write_text(IMPORTED, encoding="utf-8")
     assert output_of(code_command(IMPORTED, "a", "b c"), tmp_path) == [handover.cosim.__file__, "a", "b c"]
     monkeypatch.setattr(sys, "path", [*sys.path, str(tmp_path)])  # where it lies itself
-    assert output_of(module_command("told", "a", "{b}"), tmp_path) == [handover.cosim.__file__, "a", "{b}"]
+    assert output_of(module_command("reported", "a", "{b}"), tmp_path) == [handover.cosim.__file__, "a", "{b}"]
 
 
 PLANTED = ("json", "importlib", "secrets", "typing", "jinja2", "pandas", "starlette", "rich", "tomli", "numpy")

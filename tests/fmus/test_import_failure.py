@@ -1,4 +1,4 @@
-"""A package of a unit that cannot be imported is told in one line with its cure, by the builder and in an FMU."""
+"""A package of a unit that cannot be imported is reported in one line with its cure, by the builder and in an FMU."""
 
 import functools
 import sys
@@ -46,7 +46,7 @@ def broken_package(folder: Path, monkeypatch: pytest.MonkeyPatch, code: str, nam
 
 @pytest.mark.parametrize("case", FAILURES)
 def test_the_builder_tells_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, case: str):
-    code, told = FAILURES[case]
+    code, reported = FAILURES[case]
     name = broken_package(tmp_path, monkeypatch, code, f"package_with_{case}")
     (tmp_path / "own_blocks.py").write_text(f"import {name}\n")
     monkeypatch.syspath_prepend(str(tmp_path))
@@ -56,27 +56,27 @@ def test_the_builder_tells_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, c
     text = str(failure.value)
     assert text.startswith("own_blocks:Block: ")
     assert name in text
-    assert told in text
+    assert reported in text
     assert "\n" not in text
     assert text.count("Cure: ") == 1
 
 
 @pytest.mark.parametrize(("module", "command"), [("nunpy", False), ("pyarrow", True)])
 def test_nothing_is_to_be_installed_that_may_be_misspelled(module: str, command: bool):
-    told = explain_import(ModuleNotFoundError(f"No module named {module!r}", name=module))
-    assert module in told
-    assert ("pip install" in told) is command
+    reported = explain_import(ModuleNotFoundError(f"No module named {module!r}", name=module))
+    assert module in reported
+    assert ("pip install" in reported) is command
 
 
 def test_an_fmu_tells_it(workshop: Workshop, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     host = workshop.own("scalars:Scalars", 3)
-    code, told = FAILURES["missing_library"]
+    code, reported = FAILURES["missing_library"]
     name = broken_package(tmp_path, monkeypatch, code, "package_in_an_fmu")
     unit = host.folder / "resources" / "unit.json"
     unit.write_text(unit.read_text().replace("_fmu_", f"_fmu_{name}_"))
     (host.folder / "resources" / "sources" / "support" / "sample_units" / "scalars.py").write_text(f"import {name}\n")
     assert not host.instantiate()
-    for part in ("unit Scalars cannot be loaded: ", name, told):
+    for part in ("unit Scalars cannot be loaded: ", name, reported):
         assert part in host.log[-1]
     assert "Traceback" not in host.log[-1]
 
@@ -90,18 +90,18 @@ def test_a_module_that_a_block_itself_lacks_is_named_with_the_extra_that_brings_
 
 
 @pytest.mark.parametrize(
-    ("code", "error", "told"),
+    ("code", "error", "reported"),
     [
         ("1 / 0\n", UnknownBlock, r"cannot be loaded \(own_fault\.py, line 1\): ZeroDivisionError"),
         ("\nfrom math import no_such_name\n", PackageFailure, r"own_fault\.py, line 2"),
     ],
 )
 def test_an_error_of_the_blocks_own_module_is_reported_with_its_place(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: str, error: type[Exception], told: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: str, error: type[Exception], reported: str
 ):
     (tmp_path / "own_fault.py").write_text(code)
     monkeypatch.syspath_prepend(str(tmp_path))
-    with pytest.raises(error, match=told) as failure:
+    with pytest.raises(error, match=reported) as failure:
         import_class("own_fault:Block")
     assert type(failure.value) is error
 

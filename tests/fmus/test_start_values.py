@@ -60,10 +60,10 @@ def test_a_unit_starts_from_the_values_that_it_was_built_with(workshop: Workshop
 def test_the_model_description_tells_them_and_the_token_is_its_own(workshop: Workshop, tmp_path: Path):
     built = build_block(BLOCK, 2, tmp_path, start=START)
     d, declared = describe_fmu(built), describe_fmu(workshop.fmu("every_kind:EveryKind", 2))
-    told = {n: p.start for n, p in {**d.parameters, **d.inputs}.items() if n in START}
-    assert told["mood"] == "5"
-    assert [float(x) for x in str(told["p0"]).split()] == START["p0"]
-    assert (told["label"], told["fast"], told["mood_in"]) == ("<other>", "true", "1")
+    reported = {n: p.start for n, p in {**d.parameters, **d.inputs}.items() if n in START}
+    assert reported["mood"] == "5"
+    assert [float(x) for x in str(reported["p0"]).split()] == START["p0"]
+    assert (reported["label"], reported["fast"], reported["mood_in"]) == ("<other>", "true", "1")
     assert d.token != declared.token
     assert d.identifier == declared.identifier
     with zipfile.ZipFile(built) as archive:

@@ -173,10 +173,10 @@ def test_a_campaigns_table_and_links_lead_to_no_folder_outside(tmp_path: Path):
     column: Any = pa.array(["../../mine"] * len(table))
     pq.write_table(table.set_column(table.column_names.index("run"), "run", column), theirs / "runs.parquet")
     (linked / "runs" / "linked").symlink_to(mine)
-    for campaign, told in ((theirs, "is not a run's name"), (linked, "runs/linked is a link")):
+    for campaign, messages in ((theirs, "is not a run's name"), (linked, "runs/linked is a link")):
         refused = call("report", campaign, "--runs")
         assert refused.exit_code == 2, refused.output
-        assert told in refused.output
+        assert messages in refused.output
     assert not (mine / "report.html").exists()
 
 

@@ -74,7 +74,7 @@ def connected(address: str, path: str = "run", **options: Any) -> Generator[Clie
         yield made
 
 
-def told(page: ClientConnection, name: str) -> Any:
+def reported(page: ClientConnection, name: str) -> Any:
     """Return the next message of a name; frames and messages of other names are passed over."""
     while True:
         got = page.recv(timeout=_PATIENCE)
@@ -119,5 +119,5 @@ def _address(command: Command) -> str:
         ended = command.poll()
         if address := re.search(r"\w+: (http://\S+)", command.errors_file.read_text("utf-8")):
             return address[1]
-        assert ended is None, f"it ended before it told its address:\n{command.wait().errors}"
+        assert ended is None, f"it ended before it printed its address:\n{command.wait().errors}"
         command.join(0.05)

@@ -544,7 +544,7 @@ def _draw_times(arms: Sequence[Arm], folder: Path) -> list[Figure]:
         "step doubles, columns are equally far apart. Runs in which it never began to close are not there."
     )
     n = len(arms)
-    return drawn(folder / "times", caption, panels if ours else [], n, size=(1.2 + 3.6 * n, 4.4), legend=2)
+    return drawn(folder / "times", caption, panels if ours else [], n, size=(1.2 + 3.6 * n, 4.4), legend=min(n, 2))
 
 
 def _beside(n: int) -> Floats:

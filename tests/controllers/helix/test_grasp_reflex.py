@@ -52,12 +52,12 @@ def seen(p_GO: Any, **values: Any) -> Inputs:
     return Inputs(**{**exact, **values})
 
 
-def beside(told: Floats, true: Any) -> float:
+def beside(reported: Floats, true: Any) -> float:
     """Return the distance between two places of the ball in the gripper's frame, across its axis, m."""
-    return float(np.hypot(*(told - np.asarray(true))[:2]))
+    return float(np.hypot(*(reported - np.asarray(true))[:2]))
 
 
-def told(y: Outputs) -> Floats:
+def reported(y: Outputs) -> Floats:
     return R_DOWN @ (y.p_WO - y.p_WG)
 
 
@@ -109,7 +109,7 @@ def test_cameras_that_are_off_are_found_out_by_the_fingers():
     *_, y = [reflex.step(0.1 * k, 0.1, seen(off, ticks=ticks_of([0.0, 0.0, 0.02]))) for k in range(100)]
     assert y.source is Source.CAMERAS_AND_FINGERS
     assert beside(y.p_GO_est, [0.0] * 3) < 0.002
-    assert beside(told(y), [0.0] * 3) < 0.002
+    assert beside(reported(y), [0.0] * 3) < 0.002
     reflex, none = GraspReflex(P), {"cov_O": np.zeros((3, 3)), "cov_G": -1e-6 * np.eye(3)}
     for k in range(10):  # without covariances they are taken for exact ones
         y = reflex.step(0.1 * k, 0.1, seen([0.0, 0.0, 0.04], **none, ticks=ticks_of([0.0, 0.0, 0.04])))
@@ -162,7 +162,7 @@ def test_covered_cameras_are_bridged_by_what_the_motors_do():
 
 
 def test_a_hidden_ball_is_left_in_its_place_by_a_gripper_that_is_seen_to_move():
-    """What the motors were told counts for nothing where the ring is in view."""
+    """What the motors were asked counts for nothing where the ring is in view."""
     reflex = GraspReflex(Params(feels=False))
     reflex.step(0.0, 0.1, seen([0.0, 0.0, 0.03]))
     for k in range(1, 20):
@@ -180,8 +180,8 @@ def test_covered_cameras_and_an_arm_that_slipped_leave_it_to_the_fingers():
     u = Inputs(ticks=ticks_of(true, palm=True), q_est=Q_HANGING)
     *_, y = [reflex.step(0.1 * k, 0.1, u) for k in range(1, 60)]
     assert (y.source, y.sensors) == (Source.MOTORS_AND_FINGERS, 6)
-    assert beside(told(y), true) < 0.003
-    assert beside(told(blind.step(0.1, 0.1, u)), [0.0] * 3) < 1e-6
+    assert beside(reported(y), true) < 0.003
+    assert beside(reported(blind.step(0.1, 0.1, u)), [0.0] * 3) < 1e-6
     y = doubtful.step(0.1, 0.1, Inputs(ticks=np.array([0.0, 0.0, 0.0, 400.0, 0.0, 0.0])))
     assert (y.source, y.sensors) == (Source.MOTORS, 1)  # one reading alone is not taken in
 

@@ -307,11 +307,11 @@ def test_jitter_draws_each_control_period_evenly_about_the_nominal_one():
 
 
 def test_what_does_not_converge_is_reported(monkeypatch: pytest.MonkeyPatch):
-    def told(**values: Any) -> tuple[bool, bool]:
+    def reported(**values: Any) -> tuple[bool, bool]:
         y: Outputs = own(**values).run(Phase.DESCEND, ball_at(0.0))
         return y.estimate_converged, y.step_converged
 
-    assert told(epsilon_control=0.05) == (True, True)
-    assert told(epsilon_control=1e-9) == (True, False)
+    assert reported(epsilon_control=0.05) == (True, True)
+    assert reported(epsilon_control=1e-9) == (True, False)
     monkeypatch.setattr(estimation, "_MAX_ITERATIONS", 1)
-    assert told(epsilon_control=0.05)[0] is False
+    assert reported(epsilon_control=0.05)[0] is False

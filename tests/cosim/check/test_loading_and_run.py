@@ -26,7 +26,7 @@ def checked(folder: Path, library: bytes, description: str = decay.DESCRIPTION) 
     return check_fmu(decay.pack(folder / "Decay.fmu", library, description), 60.0)
 
 
-def told(report: CheckReport, section: str) -> tuple[Level, str]:
+def reported(report: CheckReport, section: str) -> tuple[Level, str]:
     found = next(s for s in report.sections if s.name == section)
     assert found.reached
     return found.level, "\n".join(line for f in found.findings for line in (f.line, *f.log))
@@ -57,20 +57,20 @@ def test_a_sound_unit_passes(decay_library: bytes, tmp_path: Path, monkeypatch: 
     ],
 )
 def test_a_spoilt_run_is_reported(decay_library: bytes, tmp_path: Path, mode: str, level: Level, wording: Wording):
-    found, lines = told(checked(tmp_path, decay_library, decay.spoilt(mode)), "run")
+    found, lines = reported(checked(tmp_path, decay_library, decay.spoilt(mode)), "run")
     assert found is level
     wording.check(lines)
 
 
 def test_a_run_that_hangs_is_ended(decay_library: bytes, tmp_path: Path, probes: ForkedProbes):
     probes.hangs_after = '"call": "fmi2DoStep", "t": 0.2'
-    found, lines = told(checked(tmp_path, decay_library, decay.spoilt("hangs")), "run")
+    found, lines = reported(checked(tmp_path, decay_library, decay.spoilt("hangs")), "run")
     assert found is Level.FAULT
     assert "fmi2DoStep at t = 0.2 s was not done after 60 s; if it only needs longer: --timeout" in lines
 
 
 def test_a_refused_instantiation_is_reported_with_the_log(decay_library: bytes, tmp_path: Path):
-    found, lines = told(checked(tmp_path, decay_library, decay.edited(('guid="decay"', 'guid="x"'))), "run")
+    found, lines = reported(checked(tmp_path, decay_library, decay.edited(('guid="decay"', 'guid="x"'))), "run")
     assert found is Level.FAULT
     assert "instantiation: wrong guid x" in lines.replace("[Error] ", "")
 
@@ -78,7 +78,7 @@ def test_a_refused_instantiation_is_reported_with_the_log(decay_library: bytes, 
 @pytest.mark.parametrize("part", [0.3, 0.9, 0.999])
 def test_a_library_that_is_cut_off_is_not_loaded(decay_library: bytes, tmp_path: Path, part: float):
     report = checked(tmp_path, decay_library[: int(part * len(decay_library))])
-    found, lines = told(report, "binaries")
+    found, lines = reported(report, "binaries")
     assert found is Level.FAULT
     assert f"{decay.LIBRARY}: the library is shorter than its headers say (it has " in lines
     assert not report.sections[-1].reached
@@ -112,20 +112,20 @@ def test_a_crash_on_loading_is_reported(
     monkeypatch.setenv("DECAY_ON_LOAD", wish)
     probes.hangs_after = '"call": "loading the library"' if wish == "hang" else ""
     report = checked(tmp_path, decay_library)
-    found, lines = told(report, "loading")
+    found, lines = reported(report, "loading")
     assert found is Level.FAULT
     assert wanted in lines
     assert not report.sections[-1].reached
 
 
 def test_all_missing_functions_are_reported(tmp_path: Path):
-    found, lines = told(checked(tmp_path, decay.compiled(tmp_path, "-DWITHOUT_STATE")), "loading")
+    found, lines = reported(checked(tmp_path, decay.compiled(tmp_path, "-DWITHOUT_STATE")), "loading")
     assert found is Level.FAULT
     assert "lacks 3 of 34 functions: fmi2FreeFMUstate, fmi2GetFMUstate, fmi2SetFMUstate" in lines
 
 
 def test_a_library_with_functions_of_other_names_is_reported(decay_library: bytes, tmp_path: Path):
-    _, lines = told(checked(tmp_path, decay_library.replace(b"\0fmi2", b"\0abc_")), "loading")
+    _, lines = reported(checked(tmp_path, decay_library.replace(b"\0fmi2", b"\0abc_")), "loading")
     assert "exports none of the 34 functions of fmi2" in lines
 
 
@@ -135,13 +135,13 @@ def test_a_missing_library_is_named(tmp_path: Path):
     flags = ["-shared", "-fPIC", f"-Wl,-soname,{other.name}", "-o", str(other)]
     decay.compile_c([str(tmp_path / "other.c"), *flags])
     library = decay.compiled(tmp_path, "-DNEEDS_OTHER", str(other))
-    _, lines = told(checked(tmp_path, library), "loading")
+    _, lines = reported(checked(tmp_path, library), "loading")
     assert "it needs the shared library libother.so, which is not on this machine" in lines
 
 
 def test_a_function_that_no_library_has_is_named(tmp_path: Path):
     library = decay.compiled(tmp_path, "-DNEEDS_OTHER", "-Wl,-z,undefs", "-Wl,--allow-shlib-undefined")
-    _, lines = told(checked(tmp_path, library), "loading")
+    _, lines = reported(checked(tmp_path, library), "loading")
     assert "it uses the function other, which is neither in it nor in a library that it names" in lines
 
 
@@ -163,7 +163,7 @@ def test_the_linker_is_translated(wording: Wording):
 def test_a_library_for_another_machine_is_reported(decay_library: bytes, tmp_path: Path):
     other, machine = ("aarch64-linux", 183) if host_platform() == "x86_64-linux" else ("x86_64-linux", 62)
     report = checked(tmp_path, decay_library[:18] + machine.to_bytes(2, "little") + decay_library[20:])
-    found, lines = told(report, "binaries")
+    found, lines = reported(report, "binaries")
     assert found is Level.FAULT
     assert f"made for {other}, not for {fmpy.platform}" in lines
 
@@ -182,7 +182,7 @@ def test_a_library_that_is_not_where_it_should_be_is_reported(
 ):
     monkeypatch.setattr(decay, "LIBRARY", moved)
     report = checked(tmp_path, decay_library)
-    found, lines = told(report, "binaries")
+    found, lines = reported(report, "binaries")
     assert found is Level.FAULT
     assert wanted in lines
     assert not report.sections[-1].reached

@@ -22,7 +22,7 @@ FMI_CALLS = {
 """What the standards call differently, None where one has no such call."""
 
 
-def told(fmi: int, call: str, folder: Path, **options: Any) -> list[WarningData]:
+def reported(fmi: int, call: str, folder: Path, **options: Any) -> list[WarningData]:
     """Run for 1 s a unit that warns in a call, from 0.3 s on where it steps, between two sound ones."""
     s = System()
     sound, warning = faulty_fmu("sound", fmi, folder), faulty_fmu(f"warning_in_{call}", fmi, folder)
@@ -52,7 +52,7 @@ WAYS: dict[str, dict[str, Any]] = {
 @pytest.mark.parametrize(("fmi", "algorithm"), [(2, Algorithm.GAUSS_SEIDEL), (3, Algorithm.JACOBI)])
 def test_all_calls_that_warn_are_counted_alike_on_all_paths(fmi: int, algorithm: Algorithm, tmp_path: Path):
     """Also those of initialisation and termination, and what an isolated unit is set to later than it was asked for."""
-    ways = {way: told(fmi, "all", tmp_path, algorithm=algorithm, **options) for way, options in WAYS.items()}
+    ways = {way: reported(fmi, "all", tmp_path, algorithm=algorithm, **options) for way, options in WAYS.items()}
     (first,) = ways["plan"]
     setting, getting, setup = FMI_CALLS[fmi]
     gets = 9 if algorithm is Algorithm.JACOBI else 8  # which gets outputs as it arrives, so twice where runs meet

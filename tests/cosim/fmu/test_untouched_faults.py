@@ -1,4 +1,4 @@
-"""Faults of a model description: where co-simulation does not touch them they are told, elsewhere they are refused."""
+"""Faults of a model description: reported where co-simulation does not touch them, elsewhere refused."""
 
 import logging
 from collections.abc import Iterable
@@ -174,15 +174,15 @@ def test_a_check_and_a_run_propose_the_same_step(
     file = edited("mass", 3, (' stepSize="0.01"', size), ("<CoSimulation ", f"<CoSimulation{flag} "))
     system = System()
     system.add("mass", file, f=2.0)
-    told = {s.name: s.summary for s in check_fmu(file, timeout=60.0).sections}
+    reported = {s.name: s.summary for s in check_fmu(file, timeout=60.0).sections}
     assert len(system.tolerated) == (step is None)
     if step is None:
         step = Fraction(1, 500)  # of the default experiment, which ends at 1 s
-        assert told["interface"] == "co-simulation, no step size given: a run takes 0.002 s"
+        assert reported["interface"] == "co-simulation, no step size given: a run takes 0.002 s"
     else:
-        assert told["interface"] == f"co-simulation, steps of {float(step):g} s"
+        assert reported["interface"] == f"co-simulation, steps of {float(step):g} s"
     assert system.units["mass"].period == step
-    assert told["run"].startswith(f"10 steps of {float(step):g} s")
+    assert reported["run"].startswith(f"10 steps of {float(step):g} s")
 
 
 @pytest.mark.parametrize("fmi", [2, 3])

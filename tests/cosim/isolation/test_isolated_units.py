@@ -259,7 +259,7 @@ def test_it_runs_with_this_python(doubling: Path, monkeypatch: pytest.MonkeyPatc
 
 def test_where_this_python_has_no_library_cause_and_cure_are_reported(doubling: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(unit_process, "_libpython", lambda: "")
-    with pytest.raises(InvalidFmu) as told:
+    with pytest.raises(InvalidFmu) as reported:
         isolated(doubling).__enter__()
-    assert "but names no library of Python that it needs" in str(told.value)
-    assert "Cure: run it without isolation, or install Debian's libpython3" in str(told.value)
+    assert "but names no library of Python that it needs" in str(reported.value)
+    assert "Cure: run it without isolation, or install Debian's libpython3" in str(reported.value)

@@ -136,7 +136,7 @@ MANY = 100
             math.inf,
             {0.0: "pause", 0.3: "step", 0.31: "step", 0.6: "step", 0.8: "go"},
             {0.0: 0, 0.3: 2, 0.6: 1, 0.8: MANY},
-            id="as many steps as it is told",
+            id="as many steps as it is asked",
         ),
         pytest.param(
             math.inf, {0.3: "step and go", 0.5: "pause"}, {0.0: MANY, 0.3: MANY, 0.5: 0}, id="no step is kept"
@@ -214,7 +214,7 @@ def test_what_is_set_by_one_is_read_by_the_other(tmp_path: Path):
     assert here.take_step()
     assert not here.take_step()
     here.close()
-    assert (here.pace, here.paused) == (math.inf, True)  # closed, it says what it said, and keeps what it is told
+    assert (here.pace, here.paused) == (math.inf, True)  # closed, it says what it said, and keeps what it is given
     here.pace = 4.0
     assert (here.pace, there.pace) == (4.0, math.inf)
     there.close()

@@ -13,7 +13,7 @@ typedef struct {
 
 typedef struct {
     double delay;
-    int32_t ring, wish, last_wish, waiting, told, rings;
+    int32_t ring, wish, last_wish, waiting, sent, rings;
 } Alarm;
 
 static const Variable of_pulses[] = {
@@ -59,7 +59,7 @@ static void watch(Unit *unit, Update *update) {
         self->waiting = false;
     }
     if (self->wish != self->last_wish)
-        self->waiting = true, self->told = false;
+        self->waiting = true, self->sent = false;
     self->last_wish = self->wish;
 }
 static int remaining(Unit *unit, double *interval) {
@@ -67,8 +67,8 @@ static int remaining(Unit *unit, double *interval) {
     *interval = self->delay;
     if (!self->waiting)
         return NOT_YET_KNOWN;
-    int qualifier = self->told ? UNCHANGED : CHANGED;
-    self->told = true;
+    int qualifier = self->sent ? UNCHANGED : CHANGED;
+    self->sent = true;
     return qualifier;
 }
 

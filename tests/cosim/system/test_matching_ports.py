@@ -68,8 +68,8 @@ def test_an_input_that_several_units_match_is_refused_until_one_is_named(s: Syst
     for _ in range(2):
         assert s.connect(mass.y, spring.u).connected == ("x",)
     for unit in (other, third):
-        told = s.connect(unit.y, spring.u)
-        assert (told.connected, dict(told.left)) == ((), {"x": "mass.x matches it, too"})
+        reported = s.connect(unit.y, spring.u)
+        assert (reported.connected, dict(reported.left)) == ((), {"x": "mass.x matches it, too"})
     for taken_back in (None, mass.y.x):
         if taken_back is not None:
             s.disconnect(taken_back)

@@ -109,8 +109,8 @@ def test_faulty_terminals_of_both_ends_are_refused_as_a_whole(bench: Bench):
 def test_an_ambiguity_names_the_candidates_and_is_settled_by_naming_terminals_in_pairs(bench: Bench, wording: Wording):
     a = bench.giver("robot", {"x": "m", "y": "m"}, named("left", p="x"), named("right", p="y"))
     b = bench.taker("scene", {"z": "m", "w": "m"}, named("first", p="z"), named("second", p="w"))
-    told = bench.system.connect(a.y, b.u)
-    assert (bench.system.connections, set(told.left)) == ([], {"z", "w"})
+    reported = bench.system.connect(a.y, b.u)
+    assert (bench.system.connections, set(reported.left)) == ([], {"z", "w"})
     wording.check(bench.faults)
     bench.system.connect(a.y.left, b.u.second)
     wording.check(bench.faults)

@@ -65,7 +65,7 @@ def test_it_is_valid_and_causality_decides_variability_initial_and_start(worksho
             assert (v["initial"], has_start) == ("calculated", False), name
         else:
             assert (name, v["causality"], v["variability"], has_start) == ("time", "independent", "continuous", False)
-    found = [variables[name]["variability"] for name in ("heading", "count", "gear_out", "told", way)]
+    found = [variables[name]["variability"] for name in ("heading", "count", "gear_out", "reported", way)]
     assert found == ["continuous", *["discrete"] * 3, "continuous" if block == ALL else "discrete"]
 
 
@@ -111,7 +111,7 @@ def test_fmi_2_lists_outputs_and_initial_unknowns_by_index(workshop: Workshop):
     inputs = [index["heading"], index["heat"]]
     parameters = [i for name, i in index.items() if name.startswith(("gear", "label", "wide", "free", "empty"))]
     parameters.remove(index["gear_out"])
-    outputs = [index[name] for name in ("way[1]", "way[2]", "gear_out", "told")]
+    outputs = [index[name] for name in ("way[1]", "way[2]", "gear_out", "reported")]
     now = root.findall("ModelStructure/Outputs/Unknown")
     first = root.findall("ModelStructure/InitialUnknowns/Unknown")
     assert [int(u.attrib["index"]) for u in now] == [int(u.attrib["index"]) for u in first] == outputs
@@ -125,7 +125,7 @@ def test_fmi_3_lists_outputs_and_initial_unknowns_by_value_reference(workshop: W
     parameters = [reference[name] for name in ("gear", "label", "wide", "free", "empty")]
     feeding = {"way": [reference["heading"], reference["heat"]], "data_out": [reference["data"]]}
     now, first = root.findall("ModelStructure/Output"), root.findall("ModelStructure/InitialUnknown")
-    outputs = ["way", "x", "gear_out", "data_out", "told", "on"]
+    outputs = ["way", "x", "gear_out", "data_out", "reported", "on"]
     for listed in (now, first):
         assert [int(u.attrib["valueReference"]) for u in listed] == [reference[name] for name in outputs]
     assert [numbers(u) for u in now] == [feeding.get(name, []) for name in outputs]

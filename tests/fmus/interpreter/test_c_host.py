@@ -62,9 +62,9 @@ def expect_values(done: "subprocess.CompletedProcess[str]") -> None:
     assert (done.stdout.splitlines(), done.returncode) == ([VALUE] * 2, 0)
 
 
-def expect_refusal(done: "subprocess.CompletedProcess[str]", *told: str) -> None:
+def expect_refusal(done: "subprocess.CompletedProcess[str]", *reported: str) -> None:
     assert done.returncode == 1
-    assert [part for part in told if part not in done.stdout] == []
+    assert [part for part in reported if part not in done.stdout] == []
 
 
 def expect_separate_process(done: "subprocess.CompletedProcess[str]") -> None:
@@ -152,12 +152,12 @@ LISTED: dict[str, tuple[str | None, dict[str, str], str]] = {
     "an old library": ("", {"FMU_LIBPYTHON": "TMP/3.9.1"}, "Python 3.9.1 is too old, 3.10 or later is needed"),
     "another home": ("", {"FMU_LIBPYTHON": "TMP/3.11.2", "PYTHONHOME": "/x"}, "PYTHONHOME is set, to /x; it"),
 }
-"""By what is wrong: the note (None: the right one), the environment, and what is told."""
+"""By what is wrong: the note (None: the right one), the environment, and what is reported."""
 
 
 @pytest.mark.parametrize("case", LISTED)
 def test_all_that_was_tried_is_reported_with_a_cure(unpacked: CtypesHost, tmp_path: Path, case: str):
-    note, environment, told = LISTED[case]
+    note, environment, reported = LISTED[case]
     if note is not None:
         note_of(unpacked).write_text(note)
     (tmp_path / "python3").write_text("#!/bin/sh\nexit 86\n")
@@ -168,7 +168,7 @@ def test_all_that_was_tried_is_reported_with_a_cure(unpacked: CtypesHost, tmp_pa
     places = {"UNIT": str(unpacked.library._name), "TMP": str(tmp_path)}
     filled: dict[str, Any] = {k: re.sub("^(UNIT|TMP)", lambda m: places[m[1]], v) for k, v in environment.items()}
     done = run(unpacked, **filled)
-    expect_refusal(done, "fmi2Instantiate: ", *told.split("|"))
+    expect_refusal(done, "fmi2Instantiate: ", *reported.split("|"))
     assert done.stdout.count("Cure: ") in ((1,) if case.startswith("no interpreter") else (1, 2))
     assert "saved state" not in done.stdout
     assert ("python.txt" in done.stdout) is (note is not None and "FMU_LIBPYTHON" not in environment)
@@ -190,8 +190,8 @@ def alike(folder: Path, version: str) -> str:
 @pytest.mark.parametrize("place", EITHER_PLACE)
 def test_a_unit_without_its_sources_says_what_may_be_wrong(unpacked: CtypesHost, place: str):
     shutil.rmtree(unpacked.folder / "resources" / "sources" / "handover" / "fmus")
-    told = ("cannot be read: the resources folder lacks it", "Either the resource location is wrong, or the FMU")
-    expect_refusal(run(unpacked, FMU_PYTHON_PROCESS=place), *told)
+    reported = ("cannot be read: the resources folder lacks it", "Either the resource location is wrong, or the FMU")
+    expect_refusal(run(unpacked, FMU_PYTHON_PROCESS=place), *reported)
 
 
 def test_no_second_python_is_loaded_beside_an_unfit_one(unpacked: CtypesHost, tmp_path: Path):
@@ -208,8 +208,8 @@ def test_a_library_without_its_standard_library_is_refused(unpacked: CtypesHost,
     alone = tmp_path / "a" / "b" / "c" / "d" / "e" / Path(LIBRARY).name
     alone.parent.mkdir(parents=True)
     shutil.copy(LIBRARY, alone)
-    told = f"the standard library of {alone} is not beside or above it"
-    expect_refusal(run(unpacked, FMU_LIBPYTHON=str(alone)), told)
+    reported = f"the standard library of {alone} is not beside or above it"
+    expect_refusal(run(unpacked, FMU_LIBPYTHON=str(alone)), reported)
 
 
 @NEEDS_LIBRARY
@@ -238,5 +238,5 @@ def test_a_python_without_the_packages_names_them(unpacked: CtypesHost):
     note.write_text("\n".join(lines) + "\n")
     unit = unpacked.folder / "resources" / "unit.json"
     unit.write_text(unit.read_text().replace('"module": "numpy"', '"module": "no_such_module"'))
-    told = ("needs packages that this Python does not have", "pip install") if LIBRARY else ()
-    expect_refusal(run(unpacked), *told)
+    reported = ("needs packages that this Python does not have", "pip install") if LIBRARY else ()
+    expect_refusal(run(unpacked), *reported)

@@ -94,9 +94,9 @@ def test_a_process_killed_between_two_calls_is_an_error_of_the_next_that_reset_o
     restored()
     kill(host)
     word = (ctypes.c_char_p * 1)()
-    for told in ("fmi3GetString: the unit's Python process", "has ended. Cure"):
+    for reported in ("fmi3GetString: the unit's Python process", "has ended. Cure"):
         assert host.transfer("GetString", "word", word) == ERROR
-        expect_told(host, told)
+        expect_told(host, reported)
     expect_revival(host)
     kill(host)
     assert host.call("Reset") == OK, host.log

@@ -203,11 +203,11 @@ def test_without_a_compiler_the_extra_is_named_and_nothing_is_written(tmp_path: 
 
 @pytest.mark.usefixtures("sources", "compiled")
 def test_the_command_compiles_what_it_is_asked_to_and_packs_that(tmp_path: Path):
-    for asked, told in (("x86_64-windows,aarch64-darwin,host", True), ("host", False)):
+    for asked, reported in (("x86_64-windows,aarch64-darwin,host", True), ("host", False)):
         done = CliRunner().invoke(main, ["build", "Push", "--fmi", "3", "--platform", asked, "--out", str(tmp_path)])
         assert done.exit_code == 0, done.output
-        assert ("compiling the FMI runtime for x86_64-windows\n" in done.output) is told
-        assert ("compiling" in done.output) is told
+        assert ("compiling the FMI runtime for x86_64-windows\n" in done.output) is reported
+        assert ("compiling" in done.output) is reported
         with zipfile.ZipFile(tmp_path / "Push.fmi3.fmu") as archive:
             folders = {name.split("/")[1] for name in archive.namelist() if name.startswith("binaries/")}
         assert folders == {host_platform() if name == "host" else name for name in asked.split(",")}

@@ -53,10 +53,10 @@ def test_an_output_outside_its_width_is_an_error_that_says_the_range(workshop: W
     wording.check(host.log[-1].splitlines()[-1])
 
 
-def test_a_call_of_another_type_is_reported_the_variables_own(workshop: Workshop, wording: Wording):
+def test_a_call_of_another_type_is_refused_with_the_variables_own(workshop: Workshop, wording: Wording):
     host = workshop.host(EVERY_WIDTH, 3)
     host.initialise()
-    wrong = "Float64 x, Float32 time, Int64 i16, UInt16 i16, Int32 x, Float32 told, Boolean u8"
+    wrong = "Float64 x, Float32 time, Int64 i16, UInt16 i16, Int32 x, Float32 reported, Boolean u8"
     for kind, name in map(str.split, wrong.split(", ")):
         for verb in ("Get", "Set"):
             expect_error(wording, host, host.transfer(f"{verb}{kind}", name, (DOUBLE * 1)()))

@@ -67,7 +67,7 @@ def told_by_second(workshop: Workshop, fmi: int, *, scalar: bool = False, **star
         s.connect(getattr(first.y, f"{name}_out"), getattr(second.u, name))
     seen: list[str] = []
     with Master(s) as master:
-        master.run(Fraction(1, 10), [lambda t, y: seen.append(y.text("second.told"))])  # noqa: ARG005
+        master.run(Fraction(1, 10), [lambda t, y: seen.append(y.text("second.reported"))])  # noqa: ARG005
     return seen[-1]
 
 

@@ -1,4 +1,4 @@
-"""What cannot be given away with an interpreter is told when it is built, and nothing is written."""
+"""What cannot be given away with an interpreter is reported when it is built, and nothing is written."""
 
 import importlib.metadata
 from collections.abc import Sequence

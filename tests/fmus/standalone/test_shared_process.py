@@ -196,8 +196,11 @@ def test_where_it_cannot_start_it_says_so_and_no_other_python_is_tried(host: Cty
     else:
         program.parent.rename(program.parent.with_name("riscv64-linux"))
     assert not host.instantiate()
-    told = {False: "brings its interpreter for another platform", True: "which does not start, and no other is tried"}
-    assert told[damaged] in host.log[-1]
+    reported = {
+        False: "brings its interpreter for another platform",
+        True: "which does not start, and no other is tried",
+    }
+    assert reported[damaged] in host.log[-1]
 
 
 def test_an_instance_gets_another_process_where_the_one_that_runs_is_about_to_crash(

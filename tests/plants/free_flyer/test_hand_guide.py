@@ -140,12 +140,12 @@ def test_fingers_that_close_on_a_free_object_and_do_not_hold_it_squeeze_it_out_s
 def test_hand_stops_and_keeps_what_it_holds_while_tracking_is_lost(lost: dict[str, Any]):
     scene, there = grasping(), END + np.array([0.5, 0.3, 0.0])
     before = scene.go(0.5, p_WH_track=END + np.array([0.0, 0.3, 0.0]))
-    told: dict[str, Any] = {"closed_track": False, "finger_track": np.zeros(14), "p_WH_track": there}
-    y = scene.go(1.0, **(told | lost))
+    reported: dict[str, Any] = {"closed_track": False, "finger_track": np.zeros(14), "p_WH_track": there}
+    y = scene.go(1.0, **(reported | lost))
     assert y.holder is Holder.HAND
     assert np.linalg.norm(y.p_WH - before.p_WH) < 0.12
     np.testing.assert_allclose(scene.go(0.5).p_WH, y.p_WH, atol=2e-3)
-    again = scene.go(1.5, age=0.05, q_WH_track=np.array([1.0, 0.0, 0.0, 0.0]), **told)
+    again = scene.go(1.5, age=0.05, q_WH_track=np.array([1.0, 0.0, 0.0, 0.0]), **reported)
     assert again.holder is Holder.FREE
     np.testing.assert_allclose(again.p_WH, there, atol=1e-3)
     speeds = np.linalg.norm(np.diff([s.p_WH for s in scene.seen[-90:]], axis=0), axis=1) / DT

@@ -78,7 +78,7 @@ def test_a_dropped_ball_bounces_to_no_more_than_its_height():
 
 
 def test_what_pushes_gripper_and_hand_pushes_the_ball_back():
-    """Momentum of the ball during a grasp: of its weight, and of minus the forces that are told."""
+    """Momentum of the ball during a grasp: of its weight, and of minus the forces that are reported."""
     ball, impulse = HeldBall(STILL), np.zeros(3)
     ball.lie(P_WO, np.zeros(3))
     for i in range(100):

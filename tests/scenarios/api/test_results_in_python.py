@@ -76,7 +76,7 @@ def test_plots_have_names_and_units_at_their_axes(run: handover.Run):
     assert run.plot("scene.yaw", axes=axes) is figure
     assert axes.get_ylabel() == "scene.yaw (rad)"
     plt.close(figure)
-    for names, error, told in (
+    for names, error, reported in (
         (["scene.p_WH[3]"], KeyError, r"no signal 'scene\.p_WH\[3\]'"),
         (
             ["scene.yav", "reflex.fase"],
@@ -85,7 +85,7 @@ def test_plots_have_names_and_units_at_their_axes(run: handover.Run):
         ),
         ([], ValueError, "no signal is named"),
     ):
-        with pytest.raises(error, match=told):
+        with pytest.raises(error, match=reported):
             run.plot(*names)
 
 

@@ -92,6 +92,6 @@ def test_as_the_workers_are_ended(tmp_path: Path, capsys: pytest.CaptureFixture[
         run_campaign_command(PLAN, tmp_path / "c", workers, lambda _outcome: None)
     assert caught.value.code == 1
     assert workers.ended
-    told = f"2 of 2 runs done in {tmp_path / 'c'}; run the same command again to resume"
-    assert capsys.readouterr().err.splitlines()[-1] == told
+    reported = f"2 of 2 runs done in {tmp_path / 'c'}; run the same command again to resume"
+    assert capsys.readouterr().err.splitlines()[-1] == reported
     assert CampaignTable.read(tmp_path / "c").column("run").tolist() == NAMES

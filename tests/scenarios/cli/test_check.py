@@ -118,8 +118,8 @@ def test_of_an_ssp_the_system_is_checked_and_then_each_unit(tmp_path: Path, outp
     whole, unit = json.loads(result.stdout)
     assert whole["file"] == str(file)
     assert whole["passed"] == (status == 0)
-    told = " ".join(finding["what"] for finding in whole["checks"][0]["findings"])
-    assert ("the FMU of 'push' has no variable 'f_B'" in told) == (status == 1), told
+    reported = " ".join(finding["what"] for finding in whole["checks"][0]["findings"])
+    assert ("the FMU of 'push' has no variable 'f_B'" in reported) == (status == 1), reported
     assert unit["file"] == str(file / "resources/Push.fmu")
     assert unit["passed"]
     *_, overall = check(file).stdout.splitlines()

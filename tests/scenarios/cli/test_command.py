@@ -66,8 +66,8 @@ def test_settings_of_the_environment_that_cannot_be_used_are_refused(
     (tmp_path / "file").write_text("precious")
     with monkeypatch.context() as patched:
         patched.setenv("HANDOVER_CACHE", str(tmp_path / "file"))
-        told = refusal("run", "ir_grasp", "--out", tmp_path / "r")
-        assert (told.count("\n"), "HANDOVER_CACHE" in told) == (1, True)
+        reported = refusal("run", "ir_grasp", "--out", tmp_path / "r")
+        assert (reported.count("\n"), "HANDOVER_CACHE" in reported) == (1, True)
     monkeypatch.setenv("HANDOVER_FMI_PLATFORMS", "foo")
     for arguments in (("run", "ir_grasp"), ("build", "Push")):
         wording.check(refusal(*arguments, "--out", tmp_path / "r"))
@@ -114,6 +114,6 @@ def test_a_folder_that_cannot_be_made_is_reported_by_its_name(
 
 @pytest.mark.parametrize(("words", "completed"), [("com", "compare"), ("run --alg", "--algorithm")])
 def test_a_shell_completes_commands_and_options(words: str, completed: str):
-    told = {"_HANDOVER_COMPLETE": "bash_complete", "COMP_WORDS": f"handover {words}"}
-    result = CliRunner().invoke(main, env={**told, "COMP_CWORD": str(len(words.split()))}, prog_name="handover")
+    reported = {"_HANDOVER_COMPLETE": "bash_complete", "COMP_WORDS": f"handover {words}"}
+    result = CliRunner().invoke(main, env={**reported, "COMP_CWORD": str(len(words.split()))}, prog_name="handover")
     assert result.output.strip() == f"plain,{completed}"

@@ -136,9 +136,9 @@ def test_a_sweep_has_a_table_of_values_to_vary(tmp_path: Path):
 def test_what_is_wrong_is_reported_in_one_line_and_nothing_is_written(text: str, tmp_path: Path, wording: Wording):
     file = tmp_path / ("run.json" if text.startswith(("[", "{")) else "run.toml")
     file.write_text(text, encoding="utf-8")
-    told = refusal("run", "--config", file, "--out", tmp_path / "out")
-    assert told.count("\n") == 1
-    wording.check(told)
+    reported = refusal("run", "--config", file, "--out", tmp_path / "out")
+    assert reported.count("\n") == 1
+    wording.check(reported)
     assert [*tmp_path.iterdir()] == [file]
 
 
@@ -211,9 +211,9 @@ def test_other_versions_and_files_that_are_gone_are_reported(first: Path, tmp_pa
     data["versions"]["numpy"] = "0.1"
     data["files"]["reflex"] = str(tmp_path / "gone.fmu")
     file.write_text(json.dumps(data))
-    told = refusal("run", "--config", file, "--out", tmp_path / "out")
-    assert "the run was of other versions: numpy 0.1" in told
-    assert f"the FMU of its unit reflex, {tmp_path / 'gone.fmu'}, is not there; --unit reflex=FILE" in told
+    reported = refusal("run", "--config", file, "--out", tmp_path / "out")
+    assert "the run was of other versions: numpy 0.1" in reported
+    assert f"the FMU of its unit reflex, {tmp_path / 'gone.fmu'}, is not there; --unit reflex=FILE" in reported
     del data["master"]["tolerance"]
     file.write_text(json.dumps(data))
     wording.check(refusal("run", "--config", file, "--out", tmp_path / "out"))

@@ -74,8 +74,8 @@ def test_parameters_and_other_units_are_exported(tmp_path: Path):
     file = tmp_path / "new" / "a.ssp"
     result = call("export", CHEAP, "--ssp", file, "-p", "strategy=forward", "--unit", f"reflex={other}")
     assert result.exit_code == 0, result.output
-    told = "reflex.strategy: bound as an enumeration, which libcosim and Ecos do not take"
-    assert (result.stdout, result.stderr) == (f"{file}\n", f"building units ...\n{told}\n")
+    reported = "reflex.strategy: bound as an enumeration, which libcosim and Ecos do not take"
+    assert (result.stdout, result.stderr) == (f"{file}\n", f"building units ...\n{reported}\n")
     with SspFile(file) as ssp:
         units = ssp.system.units
         assert (units["scene"].description.fmi, units["reflex"].description.fmi) == (2, 3)

@@ -25,8 +25,8 @@ def test_a_folder_that_is_none_is_reported_before_an_extra_that_is_missing(
     monkeypatch.setattr("handover.scenarios.cli.resume.require_extra", lacking)
     empty = tmp_path / "empty"
     empty.mkdir()
-    for folder, told in ((tmp_path / "nosuch", "is not a folder"), (empty, "it has no run.json")):
-        assert told in refusal("resume", folder)
+    for folder, reported in ((tmp_path / "nosuch", "is not a folder"), (empty, "it has no run.json")):
+        assert reported in refusal("resume", folder)
 
 
 @pytest.fixture(scope="module")
@@ -117,13 +117,13 @@ for call in (
 @pytest.mark.slow
 def test_python_runs_and_steps_on_the_base_installation_and_names_the_extra_of_all_else(base: Path, tmp_path: Path):
     lines = python(base, tmp_path, IN_PYTHON).splitlines()
-    told = [
+    reported = [
         ("reports", "matplotlib"),
         *3 * [("reports", "plotly")],
         *2 * [("campaigns", "scipy")],
         ("gym", "gymnasium"),
     ]
-    for line, (extra, names) in zip(lines, told, strict=True):
+    for line, (extra, names) in zip(lines, reported, strict=True):
         assert line.startswith("ImportError" if extra == "gym" else "InvalidInput")
         assert f"handover-cosim[{extra}]" in line
         assert names in line

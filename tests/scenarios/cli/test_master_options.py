@@ -64,12 +64,12 @@ def test_iterations_are_counted_and_what_does_not_converge_ends_the_run_with_sta
     assert 1.0 < metrics["iterations"]["value"] < 4.0
     assert metrics["rollbacks"]["value"] >= 10
     strict = ("--algorithm", "fixed-point", "--tolerance", "1e-15", "--iterations", "2")
-    for file, options, told in (
+    for file, options, reported in (
         (masses, strict, "found no solution in 2 iterations"),
         (ssp, ("--adaptive", "1e-9", "--smallest-step", "1/1000"), "times what is tolerated"),
     ):
         result = call("run", file, *STEPS, tmp_path / file.stem, *options)
-        assert (result.exit_code, told in result.output) == (3, True), result.output
+        assert (result.exit_code, reported in result.output) == (3, True), result.output
         assert data_in(tmp_path / file.stem)["success"] is False
     assert "b.f -> a.f still moves by" in data_in(tmp_path / "stiff")["reason"]
 
@@ -78,6 +78,6 @@ def test_an_algebraic_loop_without_a_solution_is_bad_input(tmp_path: Path):
     s = System()
     unit = s.add("a", native_fmu("gain"), a=1.0, b=1.0)
     s.connect(unit.y.y, unit.u.u)
-    told = refusal("run", write_ssp(s, tmp_path / "loop.ssp", "loop", Fraction(1)), "--out", tmp_path / "out")
-    assert "algebraic loop: a.y -> a.u, a.u feeds through to a.y" in " ".join(told.split())
+    reported = refusal("run", write_ssp(s, tmp_path / "loop.ssp", "loop", Fraction(1)), "--out", tmp_path / "out")
+    assert "algebraic loop: a.y -> a.u, a.u feeds through to a.y" in " ".join(reported.split())
     assert not (tmp_path / "out").exists()

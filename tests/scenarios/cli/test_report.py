@@ -142,5 +142,5 @@ def test_pages_of_a_campaigns_runs_are_written_and_linked_if_they_are_asked_for(
     page = campaign.report.read_text(encoding="utf-8")
     assert f"<a href='runs/{quote(run.name)}/report.html'>" in page
     assert quote(lost) not in page
-    status, told = report(run, "--runs")
-    assert (status, "--runs is for that of a campaign" in told) == (2, True)
+    status, reported = report(run, "--runs")
+    assert (status, "--runs is for that of a campaign" in reported) == (2, True)

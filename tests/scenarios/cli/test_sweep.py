@@ -85,8 +85,8 @@ def test_an_interrupted_call_goes_on_also_without_a_folder(monkeypatch: pytest.M
     result, _ = sweep(monkeypatch, "--no-report", before=raising(KeyboardInterrupt()))
     (folder,) = Path("campaigns").iterdir()
     beginning = BEGINNING.strip().replace("into c", f"into {folder}")
-    told = f"{beginning}\n1 of 2 runs done in {folder}; run the same command again to resume\n"
-    assert (result.exit_code, result.output) == (1, told)
+    reported = f"{beginning}\n1 of 2 runs done in {folder}; run the same command again to resume\n"
+    assert (result.exit_code, result.output) == (1, reported)
     assert len(CampaignTable.read(folder)) == 1
     result, begun = sweep(monkeypatch, "--no-report")
     assert (result.exit_code, result.stderr, begun) == (0, f"{beginning}; 1 are done\n", [ALL[1]])
@@ -95,8 +95,8 @@ def test_an_interrupted_call_goes_on_also_without_a_folder(monkeypatch: pytest.M
 
 def test_lost_runs_and_workers_that_go_are_reported_by_the_status(monkeypatch: pytest.MonkeyPatch):
     result, _ = sweep(monkeypatch, *INTO_C, before=raising(ClusterLost("the scheduler is gone")))
-    told = f"{BEGINNING}Error: the scheduler is gone; 1 of 2 runs done; run the same command again to resume\n"
-    assert (result.exit_code, result.output) == (3, told)
+    reported = f"{BEGINNING}Error: the scheduler is gone; 1 of 2 runs done; run the same command again to resume\n"
+    assert (result.exit_code, result.output) == (3, reported)
     result, _ = sweep(monkeypatch, *INTO_C, before=lambda _job: "its machine burnt")
     assert result.exit_code == 3
     assert "1 of 2 runs done, 1 lost" in result.output

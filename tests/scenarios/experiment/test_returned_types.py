@@ -69,11 +69,11 @@ def evaluator(**returned: Any) -> Any:
 def test_a_scenarios_method_names_the_type_that_is_right(method: str, value: Any, right: str, example: str):
     with pytest.raises(WrongType) as raised:
         getattr(scenario(**{method: value}), method)(*[None] * 4)
-    told = str(raised.value)
-    assert told.startswith("Wrong.")
-    assert f"({Path(__file__).name}, line " in told
-    assert right in told.partition("; expected ")[2].partition(", such as ")[0]
-    assert example in told.partition(", such as ")[2]
+    reported = str(raised.value)
+    assert reported.startswith("Wrong.")
+    assert f"({Path(__file__).name}, line " in reported
+    assert right in reported.partition("; expected ")[2].partition(", such as ")[0]
+    assert example in reported.partition(", such as ")[2]
 
 
 @pytest.mark.parametrize("method", ["build", "replay"])

@@ -10,7 +10,7 @@ from urllib.parse import urlsplit
 
 import pytest
 from starlette.websockets import WebSocket
-from support.live_pages import connected, send, told
+from support.live_pages import connected, reported, send
 from support.processes import until
 from support.served_live_page import answered, served
 from websockets.exceptions import ConnectionClosed, InvalidStatus
@@ -69,9 +69,9 @@ def test_a_connection_of_another_sites_page_is_refused_and_a_tracker_without_a_s
         with pytest.raises(InvalidStatus, match="403"), connected(address, path, origin=origin):
             pass
     with connected(address, "hand") as tracker:
-        told(tracker, "hand")
+        reported(tracker, "hand")
         with connected(address, "hand") as second:
-            assert "another page or tracker" in told(second, "refused")
+            assert "another page or tracker" in reported(second, "refused")
 
 
 def test_a_binary_message_and_deep_json_are_refused_and_the_connection_goes_on(page: PageWithHand, address: str):
@@ -79,9 +79,9 @@ def test_a_binary_message_and_deep_json_are_refused_and_the_connection_goes_on(p
         asked = (b"\x00", "not bytes"), ("[" * 50_000, "not JSON"), ('{"command": "fly"}', "no command 'fly'")
         for sent, why in asked:
             browser.send(sent)
-            assert why in told(browser, "refused")
+            assert why in reported(browser, "refused")
         tracker.send(b"\x00")
-        assert "not bytes" in told(tracker, "refused")
+        assert "not bytes" in reported(tracker, "refused")
         for k in range(40):
             tracker.send(sample(k))
         until(lambda: sum(page.seat.report()["samples"].values()) == 40)
@@ -129,7 +129,7 @@ def test_of_more_pages_than_a_run_is_shown_in_the_last_one_is_refused(address: s
     monkeypatch.setattr(live_page, "MOST_PAGES", 1)
     with connected(address) as first, connected(address) as second:
         send(first, "fly")
-        told(first, "refused")
+        reported(first, "refused")
         with contextlib.suppress(ConnectionClosed):
             second.recv(60.0)
         assert (second.close_code, second.close_reason) == (1013, "1 pages are open already")
@@ -138,15 +138,15 @@ def test_of_more_pages_than_a_run_is_shown_in_the_last_one_is_refused(address: s
 def test_messages_are_counted_within_the_last_second_and_two_refusals_of_a_kind_a_second_are_reported():
     now = [3.0]
     timer, rate = RefusalTimer(lambda: now[0]), MessageRate(lambda: now[0])
-    told: list[tuple[float, str]] = []
+    reported: list[tuple[float, str]] = []
     counts: list[int] = []
     for k in range(20):
         now[0] = 3.0 + 0.125 * k
         counts.append(rate.count())
-        told += [(0.125 * k, kind) for kind in ("stamp", "p_WH")[: 1 + (k % 3 == 2)] if timer.is_due(kind)]
+        reported += [(0.125 * k, kind) for kind in ("stamp", "p_WH")[: 1 + (k % 3 == 2)] if timer.is_due(kind)]
     assert counts == [*range(1, 9), *[8] * 12]
-    assert [t for t, kind in told if kind == "stamp"] == [0.0, 0.5, 1.0, 1.5, 2.0]
-    assert [t for t, kind in told if kind == "p_WH"] == [0.25, 1.0, 1.75]
+    assert [t for t, kind in reported if kind == "stamp"] == [0.0, 0.5, 1.0, 1.5, 2.0]
+    assert [t for t, kind in reported if kind == "p_WH"] == [0.25, 1.0, 1.75]
 
 
 def read_to_end(connection: socket.socket) -> bytes:

@@ -38,8 +38,8 @@ def test_a_sample_sets_the_four_inputs_of_a_hand_and_its_joints_say_whether_it_g
     bent = [0.9 * angle for angle in CLOSED]
     assert parse_hand_message(text(closed=None, angles=bent)).closed
     assert not parse_hand_message(text(closed=None, angles=[0.1] * 14)).closed
-    told = parse_hand_message(text(closed=False, angles=bent))
-    assert (told.closed, told.angles) == (False, tuple(bent))
+    reported = parse_hand_message(text(closed=False, angles=bent))
+    assert (reported.closed, reported.angles) == (False, tuple(bent))
 
 
 @pytest.mark.parametrize(

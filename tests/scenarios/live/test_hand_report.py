@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 from support.cosim.native_units import native_fmu
-from support.live_pages import connected, told
+from support.live_pages import connected, reported
 from support.served_live_page import served
 from websockets.exceptions import ConnectionClosed
 
@@ -47,14 +47,14 @@ class Told(LivePage):
 
     def __init__(self) -> None:
         super().__init__()
-        self.told: list[object] = []
+        self.reported: list[object] = []
         self.begins = asyncio.Event()
 
     async def begun(self) -> None:
         self.begins.set()
 
     async def tell(self, content: object) -> None:
-        self.told.append(content)
+        self.reported.append(content)
 
 
 def shown_run(folder: Path) -> ShownRun:
@@ -70,7 +70,7 @@ def test_a_run_whose_hand_nobody_leads_from_outside_has_no_seat_for_one(tmp_path
     page = LivePage()
     page.shown = replace(shown_run(tmp_path), seat=None)
     with served(page) as (address, _), connected(address, "hand") as device:
-        assert "hand=outside" in told(device, "refused")
+        assert "hand=outside" in reported(device, "refused")
         with pytest.raises(ConnectionClosed):
             device.recv(60.0)
         assert device.close_code == 1008
@@ -93,5 +93,5 @@ def test_the_report_is_written_where_showing_the_run_is_cancelled(tmp_path: Path
 def test_the_end_is_reported_where_the_report_cannot_be_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     page = Told()
     asyncio.run(page.show(shown_run(tmp_path), lambda: True))  # whose folder is not there
-    assert "ended" in str(page.told[-1])
+    assert "ended" in str(page.reported[-1])
     assert "inputs.json" in capsys.readouterr().err

@@ -22,8 +22,8 @@ from support.live_pages import (
     frames_come,
     live_run,
     process_with,
+    reported,
     shown,
-    told,
 )
 from support.opened_page import wait_until
 from support.processes import until
@@ -54,7 +54,7 @@ def test_a_run_waits_for_its_page_and_goes_on_without_it_if_the_pages_server_end
 
 
 def is_still(page: Page) -> str:
-    """Return the time that the page tells, once it has told no other one for a second."""
+    """Return the time that the page shows, once it has shown no other one for a second."""
     return page.evaluate(
         f"""new Promise(done => {{
             let last = "", since = 0;
@@ -214,13 +214,13 @@ def test_the_page_of_a_run_that_is_ended_from_outside_says_what_is_left_of_it(
     given = ("--pace", "0.5", "--stop", "100", *given)
     with live_run(tmp_path / "live", *given, scenario=cached("Push", 3)) as (address, run), connected(address) as page:
         frame(page)
-        while told(page, "time") < 0.3:
+        while reported(page, "time") < 0.3:
             pass
         server = process_with(run, SERVER)
         scratch = Path(server.cmdline()[server.cmdline().index(SERVER) + 2])
         assert scratch.is_dir()
         run.send_signal(how)
-        ended = told(page, "ended")
+        ended = reported(page, "ended")
     assert ended["judged"] is (how is signal.SIGINT)
     wording.check(re.sub(r"\d+\.\d+ s", "T s", ended["reason"]))
     until(lambda: not server.is_running(), 300.0)

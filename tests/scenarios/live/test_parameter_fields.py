@@ -1,4 +1,4 @@
-"""The fields that `handover play` offers for parameters: their sliders, which there are, and what is told of faults."""
+"""The fields that `handover play` offers for parameters: their sliders, which there are, and what is said of faults."""
 
 import subprocess
 from pathlib import Path

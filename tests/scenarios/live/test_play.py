@@ -12,7 +12,7 @@ import pytest
 from playwright.sync_api import Browser, Page
 from support.commands import Command, refusal, run_command
 from support.kept_runs import kept_run
-from support.live_pages import LIVE, connected, frame, frames_come, page_command, send, shown, time_passes, told
+from support.live_pages import LIVE, connected, frame, frames_come, page_command, reported, send, shown, time_passes
 from support.opened_page import overflow, wait_until
 from support.processes import until
 from support.scenarios.tutorial import SCENE, write_files
@@ -133,19 +133,19 @@ def test_an_own_scenario_is_played_with(tmp_path: Path):
         played(SCENE, tmp_path / "runs", "--pace", "50", folder=tmp_path) as (address, _),
         connected(address) as page,
     ):
-        assert "goal" in [f["name"] for group in told(page, "fields")["groups"] for f in group["fields"]]
-        told(page, "ended")
+        assert "goal" in [f["name"] for group in reported(page, "fields")["groups"] for f in group["fields"]]
+        reported(page, "ended")
         send(page, "set", {"parameters": {"goal": "0.4,0.3"}})
-        rows = told(page, "runs")["rows"]
+        rows = reported(page, "runs")["rows"]
         while [row["state"] for row in rows].count("succeeded") < 2:
-            rows = told(page, "runs")["rows"]
+            rows = reported(page, "runs")["rows"]
         assert sorted((row["number"], row["parameters"]) for row in rows) == [(1, {}), (2, {"goal": "0.4,0.3"})]
         for number in (1, 2, 1):  # at once
             send(page, "show", number)
-        while told(page, "runs")["seen"] != 1:
+        while reported(page, "runs")["seen"] != 1:
             pass
         send(page, "set", {"parameters": {"patience": "-1"}})
-        assert "patience" in told(page, "choice")["faults"]
+        assert "patience" in reported(page, "choice")["faults"]
     assert json.loads((tmp_path / "runs/002/summary.json").read_text(encoding="utf-8"))["success"]
 
 

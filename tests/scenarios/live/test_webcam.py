@@ -120,10 +120,10 @@ def test_a_hand_in_a_cameras_pictures_leads_the_hand_of_a_run(tmp_path: Path):
         with pytest.raises(BlockingIOError):
             makers.accept()  # nobody asked the makers of the package
     record = Record(tmp_path / "led" / "signals.parquet")
-    told = json.loads((tmp_path / "led" / "inputs.json").read_text(encoding="utf-8"))
-    assert told["webcam"]["sha256"] == {n: hashlib.sha256((folder / n).read_bytes()).hexdigest() for n in FILES}
-    assert told["samples"]["webcam"] > 20
-    assert not told["refused"]
+    reported = json.loads((tmp_path / "led" / "inputs.json").read_text(encoding="utf-8"))
+    assert reported["webcam"]["sha256"] == {n: hashlib.sha256((folder / n).read_bytes()).hexdigest() for n in FILES}
+    assert reported["samples"]["webcam"] > 20
+    assert not reported["refused"]
 
     age, closed, p = record["person.age"], record["person.closed_track"], record["person.p_WH_track"]
     used = np.flatnonzero(age < 0.5)

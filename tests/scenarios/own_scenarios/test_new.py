@@ -50,6 +50,6 @@ def test_how_to_run_its_test_is_reported_also_without_pytest(
         return there if name == "pytest" else None
 
     monkeypatch.setattr("handover.scenarios.cli.units.new.find_spec", find_spec)
-    told = call("new", "controller", "Quick", "--out", tmp_path).stderr
-    assert ("its test: python -m pytest test_quick.py" in told) is there
-    assert ("its test: python -m pip install pytest, then python -m pytest test_quick.py" in told) is not there
+    reported = call("new", "controller", "Quick", "--out", tmp_path).stderr
+    assert ("its test: python -m pytest test_quick.py" in reported) is there
+    assert ("its test: python -m pip install pytest, then python -m pytest test_quick.py" in reported) is not there

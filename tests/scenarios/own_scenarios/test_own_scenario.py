@@ -93,8 +93,8 @@ def test_an_installed_package_adds_scenarios_and_units_by_name(tmp_path: Path):
     call = [sys.executable, "-c", COMMANDS, *lines]
     done = subprocess.run(call, cwd=empty, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    for told in ("reaching", "An arm of two links reaches for a point", "PlanarArm", "TwoLinkArm", "joint angles"):
-        assert told in done.stdout
+    for reported in ("reaching", "An arm of two links reaches for a point", "PlanarArm", "TwoLinkArm", "joint angles"):
+        assert reported in done.stdout
     source = json.loads((empty / "run" / "run.json").read_text())["source"]
     assert source["folder"] == str(installed)  # on the path, but not where this interpreter has its packages
     assert (empty / "run" / "report.html").is_file()

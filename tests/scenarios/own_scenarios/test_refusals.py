@@ -1,4 +1,4 @@
-"""What is wrong with own scenarios, units and their values is told in one line, all at once; nothing is written."""
+"""What is wrong with own scenarios, units and their values is reported in one line, all at once; nothing is written."""
 
 import sys
 from collections.abc import Generator

@@ -59,11 +59,11 @@ def test_odd_numbers_have_none(n: int):
 
 
 def test_balance_is_reported_and_that_of_complete_sessions_by_their_rows(wording: Wording):
-    for told in (
+    for reported in (
         balance(PLAN),
         balance(PLAN, 10),
         balance_of_complete(PLAN, range(1, 13)),
         balance_of_complete(PLAN, [1, *range(3, 14)]),
         balance_of_complete(PLAN, []),
     ):
-        wording.check(told)
+        wording.check(reported)

@@ -1,4 +1,4 @@
-"""The plan of a study: the shipped one is the thesis's, and all that is wrong with another is told at once."""
+"""The plan of a study: the shipped one is the thesis's, and all that is wrong with another is reported at once."""
 
 from pathlib import Path
 

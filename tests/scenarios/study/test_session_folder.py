@@ -126,9 +126,9 @@ def test_a_kill_in_the_middle_keeps_the_rounds_before_and_the_study_goes_on(tmp_
     command = [sys.executable, "-c", _PLAYS, str(tmp_path / "out")]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=with_path()) as process:
         assert process.stdout is not None
-        told = 0
-        while told < 4:
-            told = int(process.stdout.readline())
+        reported = 0
+        while reported < 4:
+            reported = int(process.stdout.readline())
         process.send_signal(signal.SIGKILL)
     folder = StudyFolder.opened(tmp_path / "out", PLAN).session(1)
     finished = sorted(folder.records)

@@ -68,7 +68,7 @@ def difference(found: Record, wanted: Record, first: int) -> tuple[float, list[s
 
 
 def cell(case: Case, host: str) -> Cell:
-    """Return what a host makes of a case; whatever goes wrong in the host is told."""
+    """Return what a host makes of a case; whatever goes wrong in the host is reported."""
     with tempfile.TemporaryDirectory(prefix="handover-hosts-") as folder:
         try:
             run = HOSTS[host](case, Path(folder))

@@ -51,7 +51,7 @@ class Right:
 
     Attributes:
         status: of the command.
-        told: what is printed of it, besides the unit's name; `{call}` is the standard's name of the call.
+        reported: what is printed of it, besides the unit's name; `{call}` is the standard's name of the call.
         rows: recorded; None: no folder is left.
         notes: of the sound units.
         off: what the sound units' outputs may be off, relative to them: what the unit itself computes in its own
@@ -59,7 +59,7 @@ class Right:
     """
 
     status: int = 0
-    told: tuple[str, ...] = ()
+    reported: tuple[str, ...] = ()
     rows: int | None = WHOLE
     notes: frozenset[str] = ALL
     off: float = 0.0
@@ -130,16 +130,16 @@ def crash(fault: str, call: str, how: str, *, notes: frozenset[str] = NONE, fast
     right = Right(3, ("unit b crashed in {call}", f"at t = {at} s: ", how), rows, notes)
     own = "it ended its process with status 0" if how.startswith("it ended") else how
     left_out = {"plan": NO_STATES} if call == "save" else {}
-    alone = replace(right, told=(*right.told[:-1], own), notes=NOTES_BEFORE_START.get(call, ALL))
+    alone = replace(right, reported=(*right.reported[:-1], own), notes=NOTES_BEFORE_START.get(call, ALL))
     return Fault(fault, call, right, {"isolated": alone}, left_out, fast)
 
 
 def failure(
-    fault: str, call: str, status: int, *told: str, rows: int | None = WHOLE, notes: frozenset[str] = ALL,
+    fault: str, call: str, status: int, *reported: str, rows: int | None = WHOLE, notes: frozenset[str] = ALL,
     isolated: frozenset[str] | None = None, fast: tuple[str, ...] = (),
 ) -> Fault:  # fmt: skip
-    """Return a row of an error that is told; `isolated` are the sound units' notes where they differ."""
-    right = Right(status, told, rows, notes)
+    """Return a row of an error that is reported; `isolated` are the sound units' notes where they differ."""
+    right = Right(status, reported, rows, notes)
     return Fault(
         fault, call, right, {} if isolated is None else {"isolated": replace(right, notes=isolated)}, fast=fast
     )
@@ -151,10 +151,10 @@ def harmless(fault: str, call: str, *, off: float = 0.0, fast: tuple[str, ...] =
 
 
 def warned(call: str, n: int) -> Fault:
-    """Return a row of calls that answer Warning: the run goes on, and they are told with their number."""
+    """Return a row of calls that answer Warning: the run goes on, and they are reported with their number."""
     times = "once, at t = 0 s" if n == 1 else f"{n} times, first at t = 0.3 s"
-    told = f"unit b returned Warning from {{call}} {times}; last message: {call}: the step size was halved"
-    return Fault("warning", call, Right(told=(told,)))
+    reported = f"unit b returned Warning from {{call}} {times}; last message: {call}: the step size was halved"
+    return Fault("warning", call, Right(reported=(reported,)))
 
 
 FAULTS = [

@@ -1,6 +1,6 @@
 """The table of faults: what `handover run` makes of an SSP in which one unit does one thing wrong, in each way to run.
 
-The rows say what is right: exit status, what is told, rows recorded, and what the two sound units beside it note of
+The rows say what is right: exit status, what is reported, rows recorded, and what the two sound units beside it note of
 their end.
 """
 
@@ -79,8 +79,8 @@ def _alike(seen: bytes, sound: bytes, off: float) -> bool:
 def faults_of(fault: Fault, fmi: int, way: str, seen: Seen) -> list[str]:
     """Return in what a run was not as its row says."""
     right = fault.right_in(way)
-    told = [text.format(call=CALLS[fault.call][fmi - 2]) for text in right.told]
-    found = [f"{text!r} is not told" for text in told if text not in seen.output]
+    reported = [text.format(call=CALLS[fault.call][fmi - 2]) for text in right.reported]
+    found = [f"{text!r} is not reported" for text in reported if text not in seen.output]
     for what, wanted, was in (
         ("status", right.status, seen.status),
         ("rows", right.rows, seen.rows),
@@ -94,5 +94,5 @@ def faults_of(fault: Fault, fmi: int, way: str, seen: Seen) -> list[str]:
     if right.status == 0 and not _alike(seen.values, sound_values(fmi), right.off):
         found.append("the sound units' outputs are others than without the fault")
     if "Traceback" in seen.output:
-        found.append("a traceback is told")
+        found.append("a traceback is reported")
     return found

@@ -47,7 +47,7 @@ class Outputs:
     x: Metre = output("place")
     gear_out: Gear = output("gear", maximum=5)
     data_out: bytes = output("the bytes")
-    told: str = output("the label")
+    reported: str = output("the label")
     on: bool = output("switch")
 
 
@@ -62,7 +62,7 @@ class Declarations(Memoryless):
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:
         p = self.params
         way = np.array([u.heading, u.heat])
-        return Outputs(way=way, x=t + dt, gear_out=p.gear, data_out=u.data, told=p.label, on=u.count > 0)
+        return Outputs(way=way, x=t + dt, gear_out=p.gear, data_out=u.data, reported=p.label, on=u.count > 0)
 
 
 @dataclass(kw_only=True)
@@ -76,7 +76,7 @@ class InputsWithoutData:
 class OutputsWithoutData:
     way: Vector2[Kilometre] = output("way", minimum=-1.0)
     gear_out: Gear = output("gear", maximum=5)
-    told: str = output("the label")
+    reported: str = output("the label")
 
 
 class WithoutData(Memoryless):
@@ -90,4 +90,4 @@ class WithoutData(Memoryless):
 
     def step(self, t: float, dt: float, u: InputsWithoutData) -> OutputsWithoutData:  # noqa: ARG002
         p = self.params
-        return OutputsWithoutData(way=np.array([u.heading, u.heat]), gear_out=p.gear, told=p.label)
+        return OutputsWithoutData(way=np.array([u.heading, u.heat]), gear_out=p.gear, reported=p.label)

@@ -56,7 +56,7 @@ class Outputs:
     u32_out: UInt32 = output("UInt32")
     i64_out: int = output("Int64")
     u64_out: UInt64 = output("UInt64")
-    told: str = output("all inputs, as the block sees them")
+    reported: str = output("all inputs, as the block sees them")
 
 
 class EveryWidth(Memoryless):
@@ -80,7 +80,7 @@ class EveryWidth(Memoryless):
             u32_out=u.u32,
             i64_out=u.i64,
             u64_out=u.u64,
-            told=repr((u.x, u.v.tolist(), u.i8, u.u8, u.i16, u.u16, u.i32, u.u32, u.i64, u.u64)),
+            reported=repr((u.x, u.v.tolist(), u.i8, u.u8, u.i16, u.u16, u.i32, u.u32, u.i64, u.u64)),
         )
 
 

@@ -26,16 +26,16 @@ NOTE = """
         constructor(...given) {
             super(...given);
             this.addEventListener("message", ({data}) => {
-                const told = typeof data === "string" ? JSON.parse(data) : {frame: data};
-                if (told.frame) seen.frame = told.frame;
-                if (told.scene) Object.assign(seen, {scene: told.scene, frame: null, runs: seen.runs + 1});
-                if (told.target) seen.target = told.target;
-                if (told.screen && told.screen.screen !== "practising") seen.target = null;
+                const sent = typeof data === "string" ? JSON.parse(data) : {frame: data};
+                if (sent.frame) seen.frame = sent.frame;
+                if (sent.scene) Object.assign(seen, {scene: sent.scene, frame: null, runs: seen.runs + 1});
+                if (sent.target) seen.target = sent.target;
+                if (sent.screen && sent.screen.screen !== "practising") seen.target = null;
             });
         }
     };
 """
-"""Notes in the page what it is told to draw: asked for now and then, as a person looks, and not queued."""
+"""Notes in the page what it is asked to draw: asked for now and then, as a person looks, and not queued."""
 LOOK = """() => {
     if (!study.play || !seen.frame) return null;
     const {camera} = study.play.scene, box = document.querySelector("#eye canvas").getBoundingClientRect();

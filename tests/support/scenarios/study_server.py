@@ -117,7 +117,7 @@ def status(where: str, path: str, host: str = "") -> int:
         return e.code
 
 
-def told(page: ClientConnection, name: str) -> Any:
+def reported(page: ClientConnection, name: str) -> Any:
     """Return the next message of a name; states of the run are passed over."""
     while True:
         message = page.recv(timeout=120)
@@ -135,12 +135,12 @@ def to_instruction(page: ClientConnection, device: str = "mouse") -> None:
     act(page, "consent", True)
     act(page, "eligibility", [True] * 3)
     act(page, "device", device)
-    while told(page, "screen")["screen"] != "instruction":
+    while reported(page, "screen")["screen"] != "instruction":
         pass
 
 
 def to_round(page: ClientConnection) -> None:
     to_instruction(page)
     act(page, "begin")
-    told(page, "scene")
+    reported(page, "scene")
     page.send('{"ready": true}')

@@ -227,8 +227,8 @@ def test_a_presumed_loop_of_units_without_states_is_solved_at_the_start_and_repo
         master.run(Fraction(1))
         assert not master.iterates
         assert isinstance(master.stepper, PlanStepper)
-    (told,) = (r.getMessage() for r in caplog.records if "algebraic loop" in r.getMessage())
-    wording.check(told)
+    (reported,) = (r.getMessage() for r in caplog.records if "algebraic loop" in r.getMessage())
+    wording.check(reported)
 
 
 def test_a_presumed_loop_around_a_declared_one_leaves_that_solved():

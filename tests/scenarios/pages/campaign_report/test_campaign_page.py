@@ -121,8 +121,8 @@ def test_claims_stand_with_their_verdicts(tmp_path: Path):
 
 def test_a_papers_campaign_of_another_version_says_what_is_left_out(tmp_path: Path):
     html = page_of(tmp_path, campaign_metadata("helix_handover", POINTS, experiment="helix-1"), table_of(POINTS))
-    told = "The campaign is of another version of helix-1, so this is left out: its runs have no tuning."
-    assert told in part_of(html, "comparison")
+    reported = "The campaign is of another version of helix-1, so this is left out: its runs have no tuning."
+    assert reported in part_of(html, "comparison")
 
 
 @pytest.mark.parametrize(

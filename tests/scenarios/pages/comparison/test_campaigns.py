@@ -150,7 +150,7 @@ def test_a_metric_that_one_lacks_is_shown_where_it_is(tmp_path: Path):
     results = compared(first, second, metrics=["moved", "pushed"])
     assert metric_tests(results, "pushed") == []
     untested, _ = remarks_on_metrics(results)
-    assert all(told in untested for told in ("pushed", ": a has no value"))
+    assert all(reported in untested for reported in ("pushed", ": a has no value"))
     (point,) = campaigns_data(results, ())["points"]
     assert point["campaigns"]["a"]["metrics"]["pushed"] == {"median": None, "runs": 0, "interval": None}
     assert point["campaigns"]["b"]["metrics"]["pushed"]["median"] == 0.5

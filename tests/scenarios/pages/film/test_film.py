@@ -72,9 +72,9 @@ def test_a_films_scene_and_cursor_move_with_the_times_of_its_frames(
     monkeypatch.setenv("TMPDIR", str(temporary))
     monkeypatch.setattr(tempfile, "tempdir", str(temporary))
     out, plot = tmp_path / "grasp.mp4", "cost of thumb and ring, [Luberto] eq. (4)"
-    status, told = film(grasp, "--out", out, "--size", f"{WIDE}x{HIGH}", "--pace", 10, "--fps", 4, "--plot", plot)
-    assert status == 0, told
-    assert f"\nfilm: {out}, " in told
+    status, reported = film(grasp, "--out", out, "--size", f"{WIDE}x{HIGH}", "--pace", 10, "--fps", 4, "--plot", plot)
+    assert status == 0, reported
+    assert f"\nfilm: {out}, " in reported
     assert [p.name for p in tmp_path.iterdir()] == ["grasp.mp4"]
     assert list(temporary.iterdir()) == []
     time, shown = Record(grasp / "signals.parquet").time, frames(out)
@@ -95,10 +95,10 @@ def test_a_films_scene_and_cursor_move_with_the_times_of_its_frames(
 @pytest.mark.parametrize("suffix", [".gif", ".webm"])
 def test_a_gif_and_a_webm_have_the_same_frames(grasp: Path, tmp_path: Path, suffix: str):
     out = tmp_path / f"film{suffix}"
-    status, told = film(
+    status, reported = film(
         grasp, "--out", out, "--size", "320x240", "--no-plots", "--pace", 10, "--fps", 4, "--view", "top"
     )
-    assert status == 0, told
+    assert status == 0, reported
     expected = len(
         frame_times(0.0, float(Record(grasp / "signals.parquet").time[-1]), FilmSettings(pace=10.0, fps=4.0))
     )
@@ -156,9 +156,9 @@ def test_a_large_film_is_a_page_enlarged():
 @pytest.mark.slow
 def test_a_run_without_a_scene_is_filmed_by_its_plots(tmp_path: Path):
     run = copied_run(tmp_path / "run", "run", str(cached("Push", 3)), "--stop", "0.2", "--no-report")
-    status, told = film(run, "--size", "480x320", "--fps", 10)
-    assert status == 0, told
-    assert "has no scene: the film has plots only" in told
+    status, reported = film(run, "--size", "480x320", "--fps", 10)
+    assert status == 0, reported
+    assert "has no scene: the film has plots only" in reported
     assert len(frames(run / "film.mp4")) == 4  # it ends a step after 0.2 s
     assert film(run, "--force", "--no-plots")[0] == 2
 
@@ -222,18 +222,18 @@ def test_what_is_no_run_is_refused(tmp_path: Path, wording: Wording):
 def test_without_a_browser_the_way_to_one_is_reported(grasp: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("PLAYWRIGHT_BROWSERS_PATH", str(tmp_path / "none"))
     monkeypatch.setattr("handover.scenarios.pages.film.browser._NAMES", ("no-such-browser",))
-    status, told = film(grasp, "--out", tmp_path / "x.mp4")
+    status, reported = film(grasp, "--out", tmp_path / "x.mp4")
     assert status == 2
-    assert "there is no Chromium to draw the film. Cure: `python -m playwright install" in told
+    assert "there is no Chromium to draw the film. Cure: `python -m playwright install" in reported
     assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.slow
 def test_a_film_that_cannot_be_written_leaves_nothing(grasp: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", shutil.which("false") or "")
-    status, told = film(grasp, "--out", tmp_path / "x.mp4", "--pace", 10, "--size", "320x240", "--no-plots")
+    status, reported = film(grasp, "--out", tmp_path / "x.mp4", "--pace", 10, "--size", "320x240", "--no-plots")
     assert status == 3
-    assert f"{tmp_path / 'x.mp4'} cannot be written: " in told
+    assert f"{tmp_path / 'x.mp4'} cannot be written: " in reported
     assert list(tmp_path.iterdir()) == []
 
 

@@ -245,6 +245,6 @@ def test_runs_that_failed_tell_no_displacement():
     rows = [row | {"success": list(row["p_WG_handover"]) != [0.0, -0.07, 0.3]} for row in table_of().rows]
     (table,) = [t for t in HAND_OVER.tables(made_table(rows)) if "differ" in t.title]
     cells = {row[0]: dict(zip(table.header, row, strict=True)) for row in table.rows}
-    told = ("rigid felt it", "rigid succeeded", "rigid along z, mm", "compliant over rigid")
-    assert [cells["at (0, -0.07, 0.3) m"][name] for name in told] == ["3 of 3", "0 of 3", "", ""]
-    assert [cells["at (0, -0.3, 0) m"][name] for name in told] == ["3 of 3", "3 of 3", "40", "1.0"]
+    reported = ("rigid felt it", "rigid succeeded", "rigid along z, mm", "compliant over rigid")
+    assert [cells["at (0, -0.07, 0.3) m"][name] for name in reported] == ["3 of 3", "0 of 3", "", ""]
+    assert [cells["at (0, -0.3, 0) m"][name] for name in reported] == ["3 of 3", "3 of 3", "40", "1.0"]

@@ -70,8 +70,8 @@ def test_every_claim_is_judged_both_ways():
 def test_runs_that_were_lost_and_some_changes_alone_decide_nothing():
     lost = made_table({**row, "status": "lost"} for row in table_of().rows)
     assert {(c.verdict, c.measured) for c in verdicts(lost).values()} == {(Verdict.NOT_COMPARABLE, "")}
-    told = verdicts(made_table(row for row in table_of().rows if row["behaviour"] == "rigid"))
-    of_changes = one(told.values(), "A mass or an inertia")
+    reported = verdicts(made_table(row for row in table_of().rows if row["behaviour"] == "rigid"))
+    of_changes = one(reported.values(), "A mass or an inertia")
     assert (of_changes.verdict, of_changes.measured) == (Verdict.NOT_COMPARABLE, "in 4 of 4 cases")
 
 

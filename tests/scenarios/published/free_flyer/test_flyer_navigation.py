@@ -104,9 +104,9 @@ def test_of_the_quick_plan_little_is_concluded():
     claims = verdicts(table_of(quick=True)).values()
     assert {c.verdict for c in claims} == {Verdict.NOT_COMPARABLE}
     assert {c.verdict_text for c in claims if c.beyond} == {"too few runs"}
-    told = [c.reason for c in claims if c.beyond and c.measured]
-    assert told
-    assert all("Judged from" in reason or "it takes at least" in reason for reason in told)
+    reported = [c.reason for c in claims if c.beyond and c.measured]
+    assert reported
+    assert all("Judged from" in reason or "it takes at least" in reason for reason in reported)
 
 
 def test_runs_that_did_not_come_to_their_end_are_failures():

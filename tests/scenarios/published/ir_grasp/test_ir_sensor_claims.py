@@ -46,9 +46,9 @@ def test_what_follows_from_the_scenes_own_assumptions_is_reported_of_the_worst_a
         return 0.98 if run.parameters["reflectivity"] == "2" and run.repetition == 0 else 1.0
 
     claims = IrSensorCurve().claims(sensor_table(fit_b=off, rank_correlation=lost))
-    told = {"Distance over": "", "a, b, c, d vary": "off by 0 %: 20 %"}
-    told["A relative estimate"] = "rank correlation 0.9800 at least (reflectivity 2)"
-    for part, measured in told.items():
+    reported = {"Distance over": "", "a, b, c, d vary": "off by 0 %: 20 %"}
+    reported["A relative estimate"] = "rank correlation 0.9800 at least (reflectivity 2)"
+    for part, measured in reported.items():
         claim = one(claims, part)
         assert claim.verdict is Verdict.NOT_COMPARABLE
         assert claim.measured.startswith(measured)

@@ -164,8 +164,8 @@ def test_a_distance_beyond_the_range_is_reported_as_not_seen_and_runs_that_did_n
     first, *others = IrTable().tables(made)
     assert "40 runs that did not come to an end" in first.note
     table = next(t for t in others if t.title.startswith("Table II, nominal"))
-    told = {dict(zip(table.header, row, strict=True))["index, ours"] for row in table.rows}
-    assert told == {"40.0 (40.0 to 40.0); not seen in 5", "not seen in 30"}
+    reported = {dict(zip(table.header, row, strict=True))["index, ours"] for row in table.rows}
+    assert reported == {"40.0 (40.0 to 40.0); not seen in 5", "not seen in 30"}
 
 
 def test_without_any_run_that_ended_there_are_no_verdicts_and_no_failure(tmp_path: Path, sketches: Sketches):

@@ -41,7 +41,7 @@ STAGED = (
     Staged(Cause.RELEASED_UNHELD, "nobody had pulled, but it saw its gripper move at", UNGATED),
     Staged(Cause.LET_GO_EARLY, "before the fingers closed", ("person.haste=1",), HumanToRobot),
 )
-"""Other causes are told by staged signals, see test_handover_evaluation.py."""
+"""Other causes are tested by staged signals, see test_handover_evaluation.py."""
 
 
 @pytest.mark.parametrize(

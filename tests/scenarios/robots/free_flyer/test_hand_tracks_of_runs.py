@@ -20,8 +20,8 @@ from handover.scenarios.robots.free_flyer.handover.person_evaluation import Caus
 
 
 def tracked(folder: Path, out: Path) -> Path:
-    told = CliRunner().invoke(flyer_track, [str(folder), "--out", str(out)])
-    assert told.exit_code == 0, told.output
+    reported = CliRunner().invoke(flyer_track, [str(folder), "--out", str(out)])
+    assert reported.exit_code == 0, reported.output
     return out
 
 
@@ -120,7 +120,7 @@ def test_what_has_no_hand_has_no_track_and_none_goes_where_nothing_can_be_writte
         (tmp_path, "t.csv"),
         (kept("flyer_robot_to_human").folder, "file/t.csv"),
     ):
-        told = CliRunner().invoke(flyer_track, [str(folder), "--out", str(tmp_path / out)])
-        assert told.exit_code == 2
-        wording.check(told.output.replace(str(tmp_path), "TMP").replace(str(folder), "FOLDER"))
+        reported = CliRunner().invoke(flyer_track, [str(folder), "--out", str(tmp_path / out)])
+        assert reported.exit_code == 2
+        wording.check(reported.output.replace(str(tmp_path), "TMP").replace(str(folder), "FOLDER"))
         assert not (tmp_path / out).exists()

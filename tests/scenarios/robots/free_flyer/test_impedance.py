@@ -216,7 +216,7 @@ ASSUMED = "what its controllers assumed"
 
 
 @pytest.mark.parametrize(
-    ("given", "told"),
+    ("given", "reported"),
     [
         (("mass_factor=1.3", "impedance.mass=12.4592"), ""),
         (("robot.mass=19.168",), f"the robot's mass was 2 times {ASSUMED}"),
@@ -231,6 +231,6 @@ ASSUMED = "what its controllers assumed"
     ],
 )
 def test_what_the_controllers_do_not_know_is_found_from_the_values_that_the_units_got(
-    given: tuple[str, ...], told: str, tmp_path: Path
+    given: tuple[str, ...], reported: str, tmp_path: Path
 ):
-    assert model_mismatch(system_of(tmp_path, *given).units) == (f"; {told}" if told else "")
+    assert model_mismatch(system_of(tmp_path, *given).units) == (f"; {reported}" if reported else "")

@@ -77,13 +77,13 @@ def test_robots_that_do_not_come_to_rest_tell_how_far_from_their_places_they_wer
     away = re.findall(r"gripper (\d) was (\d+) mm from its place", done.outcome.reason)
     record = Record(tmp_path / "run" / "signals.parquet")
     half = 0.5 * float(LargeObjectParams().grip_spacing)
-    for (number, told), side in zip(away, (half, -half), strict=True):
+    for (number, reported), side in zip(away, (half, -half), strict=True):
         phase = f"decision.phase_{number}"
         given_up = {words: code for code, words in record.items(phase).items()}["GIVEN_UP"]
         gave_up = np.flatnonzero(record[phase] == given_up)[0]
         place = TeamParameters().p_WG_handover + np.array([0.0, side, 0.0])
         away_by_record = float(np.linalg.norm(record[f"robot_{number}.p_WG"][gave_up] - place))
-        assert float(told) == pytest.approx(1e3 * away_by_record, abs=1.0)
+        assert float(reported) == pytest.approx(1e3 * away_by_record, abs=1.0)
 
 
 def test_a_run_is_drawn_with_its_moments_and_curves(tmp_path: Path, sketches: Sketches):

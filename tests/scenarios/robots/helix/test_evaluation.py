@@ -179,7 +179,7 @@ def test_a_run_out_of_time_says_why_by_what_was_so_at_its_end(wording: Wording):
         wording.check(evaluator.outcome().reason)
     converging = ((float(t), signals(Phase.DESCEND, error=0.001 if t == 35 else 0.04)) for t in range(41))
     early = follow(*converging, parameters=Parameters(patience=40.0)).outcome().reason
-    assert all(told in early for told in ("time ran out", "0.001 m", "0.040 m", "40 s"))
+    assert all(reported in early for reported in ("time ran out", "0.001 m", "0.040 m", "40 s"))
     for until, sees_ball in ((0.3, True), (10.0, True), (10.0, False)):
         waiting = signals(Phase.WAIT, sees_ball=sees_ball)
         wording.check(follow((0.0, waiting), (until, waiting)).outcome().reason)

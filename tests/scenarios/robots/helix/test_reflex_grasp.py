@@ -1,4 +1,4 @@
-"""The grasp by infrared fingers: where the ball is offered, what the cameras see, what is told of it, whole runs."""
+"""The grasp by infrared fingers: where the ball is offered, what the cameras see, what is said of it, whole runs."""
 
 from pathlib import Path
 from typing import Any

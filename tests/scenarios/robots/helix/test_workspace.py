@@ -1,4 +1,4 @@
-"""Where the Helix reaches and its cameras see, and what is told of a place beyond it."""
+"""Where the Helix reaches and its cameras see, and what is said of a place beyond it."""
 
 import json
 from itertools import product

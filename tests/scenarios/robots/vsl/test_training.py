@@ -77,8 +77,8 @@ def test_either_input_of_the_forward_model_is_learned(forward_input: ForwardInpu
     assert parse_model(model_text(model), "x").forward_input is forward_input
     assert errors.forward_other_input is not None
     assert max(errors.forward_hybrid, errors.forward_other_input) < 0.2 * errors.forward_model_based
-    told = model.provenance["mean_test_errors_m"]["forward_other_input"]
-    assert told == pytest.approx(errors.forward_other_input, rel=1e-3)
+    reported = model.provenance["mean_test_errors_m"]["forward_other_input"]
+    assert reported == pytest.approx(errors.forward_other_input, rel=1e-3)
 
 
 @pytest.mark.slow

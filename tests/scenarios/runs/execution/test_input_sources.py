@@ -89,10 +89,10 @@ def test_a_run_led_by_shared_inputs_is_played_back_byte_for_byte(tmp_path: Path)
     handover.run("flyer_robot_to_human", out=tmp_path / "again", **again)
     a, b = ((tmp_path / name / "signals.parquet").read_bytes() for name in ("led", "again"))
     assert a == b
-    told = [data_in(tmp_path / name, "run") for name in ("led", "again")]
-    assert told[0]["inputs"] == {"from": "program", "what": "a script"}
-    assert (told[1]["inputs"]["from"], told[1]["inputs"]["folder"]) == ("run", str(tmp_path / "led"))
-    assert told[0]["external_inputs"] == told[1]["external_inputs"] == [*GOALS, "person.age"]
+    reported = [data_in(tmp_path / name, "run") for name in ("led", "again")]
+    assert reported[0]["inputs"] == {"from": "program", "what": "a script"}
+    assert (reported[1]["inputs"]["from"], reported[1]["inputs"]["folder"]) == ("run", str(tmp_path / "led"))
+    assert reported[0]["external_inputs"] == reported[1]["external_inputs"] == [*GOALS, "person.age"]
     handover.run("flyer_robot_to_human", out=tmp_path / "other", propulsion="nozzles", **again)
     meets_the_same_hand = Record(tmp_path / "other" / "signals.parquet")
     np.testing.assert_array_equal(meets_the_same_hand["person.p_WH_track"], led["person.p_WH_track"])
@@ -189,8 +189,8 @@ def test_a_run_that_could_be_pushed_is_resumed_as_it_was_recorded_and_is_then_le
     run_task(task, snapshot, Interruption())
     whole = Record(tmp_path / "whole" / "signals.parquet")
     for name in at:
-        told = call("resume", tmp_path / name, "--no-report")
-        assert (tmp_path / name / "summary.json").is_file(), told.output
+        reported = call("resume", tmp_path / name, "--no-report")
+        assert (tmp_path / name / "summary.json").is_file(), reported.output
     released, held = (tmp_path / name / "signals.parquet" for name in ("released", "held"))
     assert released.read_bytes() == (tmp_path / "whole" / "signals.parquet").read_bytes()
     record = Record(held)

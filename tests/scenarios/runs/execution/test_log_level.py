@@ -1,4 +1,4 @@
-"""`--log-level`: what is told on standard error of units' logs and of the master's progress, with the same results."""
+"""`--log-level`: units' logs and the master's progress on standard error, with the same results."""
 
 import logging
 from pathlib import Path
@@ -12,7 +12,7 @@ CHOSEN = "debug: talks: [OK] 0 categories are chosen"
 STEPPED = "info: units are stepped to t = 0.2 s"
 
 
-def told(out: Path, *options: str, fmi: int = 2) -> str:
+def reported(out: Path, *options: str, fmi: int = 2) -> str:
     """Return what a run of a unit that warns at each step tells on standard error."""
     arguments = ("run", native_fmu("talks", fmi), "--stop", "0.2", "--no-report", "--out", out, *options)
     before = logging.getLogger("handover").handlers[:]
@@ -32,15 +32,15 @@ def told(out: Path, *options: str, fmi: int = 2) -> str:
     ],
 )
 def test_a_level_tells_of_that_and_what_is_above(tmp_path: Path, level: str, lines: list[str], not_told: list[str]):
-    printed = told(tmp_path / "r", "--log-level", level)
+    printed = reported(tmp_path / "r", "--log-level", level)
     assert all(line in printed for line in lines), printed
     assert not any(text in printed for text in not_told), printed
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_results_are_the_same_bytes_also_of_isolated_units(tmp_path: Path, fmi: int):
-    assert told(tmp_path / "1", fmi=fmi) == ""  # units that do not fail are silent
+    assert reported(tmp_path / "1", fmi=fmi) == ""  # units that do not fail are silent
     for number, isolate in (("2", ()), ("3", ("--isolate", "all"))):
-        assert CHOSEN in told(tmp_path / number, "--log-level", "debug", *isolate, fmi=fmi)
+        assert CHOSEN in reported(tmp_path / number, "--log-level", "debug", *isolate, fmi=fmi)
         record = (tmp_path / number / "signals.parquet").read_bytes()
         assert record == (tmp_path / "1" / "signals.parquet").read_bytes()

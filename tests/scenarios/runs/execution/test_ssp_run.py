@@ -90,13 +90,13 @@ def test_a_unit_that_ends_the_simulation_ends_the_run_well(fmi: int, tmp_path: P
     out = tmp_path / "out"
     result = run(failing_ssp(tmp_path, "ends", fmi), "--out", out, "--checkpoint", "0.1", "--no-report")
     assert result.exit_code == 0, result.output
-    told = "ran to 0.3 s of 1 s; unit bad ended the simulation at t = 0.3 s"
-    assert f"ends.ssp succeeded: {told}" in result.output
+    reported = "ran to 0.3 s of 1 s; unit bad ended the simulation at t = 0.3 s"
+    assert f"ends.ssp succeeded: {reported}" in result.output
     assert "to resume" not in result.output
     assert Record(out / "signals.parquet").time.tolist() == [0.0, 0.1, 0.2, 0.3]
     summary = data_in(out)
     assert (summary["success"], summary["complete"], summary["failure"]) == (True, True, None)
-    assert (summary["reason"], summary["simulated_seconds"]) == (told, 0.3)
+    assert (summary["reason"], summary["simulated_seconds"]) == (reported, 0.3)
     ended = summary["ended"]
     assert (ended["instance"], ended["call"], ended["time"], ended["reached"]) == ("bad", f"fmi{fmi}DoStep", 0.2, 0.3)
     refusal("resume", out)  # it is complete
@@ -117,8 +117,8 @@ def test_a_unit_that_fails_ends_the_run_with_status_3_and_its_parameters_are_set
     given = ("-p", "left.tears=0.45", "-p", "right.tears=1.05", "--checkpoint", "0.2", "--no-report", "--out", out)
     result = run(file, *given)
     assert (result.exit_code, "the spring tore" in result.output) == (3, True), result.output
-    told = "a unit failed: left: fmi2DoStep at t = 0.5 s: RuntimeError: the spring tore"
-    assert data_in(out)["reason"].startswith(told)
+    reported = "a unit failed: left: fmi2DoStep at t = 0.5 s: RuntimeError: the spring tore"
+    assert data_in(out)["reason"].startswith(reported)
     assert Record(out / "signals.parquet").time[-1] == pytest.approx(0.5)
     data = data_in(out, "run")
     assert data["source"]["parameters"] == ["left.tears=0.45", "right.tears=1.05"]

@@ -25,9 +25,9 @@ def test_a_run_ends_with_a_line_and_goes_on_until_then(tmp_path: Path, fmi: int,
     assert NAN_LINE in result.output.splitlines()
     summary = data_in(tmp_path / "r")
     assert summary["complete"]
-    (told,) = summary["not_finite"]
-    assert (told["instance"], told["output"], told["value"]) == ("gives_nan", "y", "NaN")
-    assert told["time"] == pytest.approx(0.3)
+    (reported,) = summary["not_finite"]
+    assert (reported["instance"], reported["output"], reported["value"]) == ("gives_nan", "y", "NaN")
+    assert reported["time"] == pytest.approx(0.3)
     y, metrics = Record(tmp_path / "r" / "signals.parquet")["gives_nan.y"], summary["metrics"]
     finite = y[np.isfinite(y)]
     assert [metrics[name]["value"] for name in ("min_y", "max_y")] == [finite.min(), finite.max()]

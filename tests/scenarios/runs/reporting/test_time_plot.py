@@ -74,8 +74,8 @@ def test_groups_have_one_colour_and_a_palette_keeps_it_where_others_are_missing(
 
 def test_levels_are_reported_with_their_unit():
     levels = [Level(label="full", value=2.5)]
-    told = [TimePlot(title="", quantity="x", unit=unit, curves=(), levels=levels) for unit in ("mm", "°", "")]
-    assert [plot.level_labels for plot in told] == [("full: 2.5 mm",), ("full: 2.5°",), ("full: 2.5",)]
+    reported = [TimePlot(title="", quantity="x", unit=unit, curves=(), levels=levels) for unit in ("mm", "°", "")]
+    assert [plot.level_labels for plot in reported] == [("full: 2.5 mm",), ("full: 2.5°",), ("full: 2.5",)]
 
 
 def test_an_axis_with_one_limit_shows_all_that_is_drawn():

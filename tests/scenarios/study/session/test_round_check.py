@@ -95,8 +95,8 @@ def test_a_changed_record_and_other_versions_are_reported(
     (folder / "run.json").write_text(json.dumps(about), encoding="utf-8")
     done = checked(out)
     assert done.exit_code == 1, done.output
-    told = f"first in {name} at {float(table.column('time')[row].as_py())!r} s: "
-    assert f"{told}{float(values[row])!r} in the record, {was!r} in the repeated run" in done.output
+    reported = f"first in {name} at {float(table.column('time')[row].as_py())!r} s: "
+    assert f"{reported}{float(values[row])!r} in the record, {was!r} in the repeated run" in done.output
     assert "P01, round 1 was recorded by other versions: handover-cosim 0.0.1 (here " in done.output
 
 
@@ -107,8 +107,8 @@ def test_the_first_difference_is_the_first_in_time(tmp_path: Path):
 
     one = of("one", a=[1.0, 2.0, 3.0], b=[float("nan"), 5.0, 6.0])
     assert first_difference(one, of("same", a=[1.0, 2.0, 3.0], b=[float("nan"), 5.0, 6.0])) is None
-    told = first_difference(one, of("other", a=[1.0, 2.0, -3.0], b=[float("nan"), -5.0, 6.0]))
-    assert told == "b at 0.1 s: 5.0 in the record, -5.0 in the repeated run"
+    reported = first_difference(one, of("other", a=[1.0, 2.0, -3.0], b=[float("nan"), -5.0, 6.0]))
+    assert reported == "b at 0.1 s: 5.0 in the record, -5.0 in the repeated run"
     assert first_difference(one, of("less", a=[1.0, 2.0, 3.0])) == "b: in the record alone"
 
 

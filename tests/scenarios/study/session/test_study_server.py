@@ -18,10 +18,10 @@ from support.scenarios.study_server import (
     act,
     page_at,
     page_of,
+    reported,
     served,
     server_of,
     status,
-    told,
 )
 from support.wording import Wording
 from websockets.exceptions import ConnectionClosed, InvalidStatus
@@ -59,7 +59,7 @@ def test_on_another_address_the_page_is_below_a_token(tmp_path: Path):
         with pytest.raises(InvalidStatus), page_at(where):
             pass
         with page_at(where, server.path) as page:
-            assert told(page, "screen")["screen"] == "language"
+            assert reported(page, "screen")["screen"] == "language"
 
 
 @pytest.mark.parametrize("family", [socket.AF_INET, socket.AF_INET6])
@@ -73,10 +73,10 @@ def test_a_server_on_all_addresses_names_one_that_others_can_open(family: socket
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_signals_end_it_from_the_moment_on_that_its_address_is_printed(number: signal.Signals, tmp_path: Path):
-    told, before = list[str](), signal.signal(number, signal.default_int_handler)  # under nohup one is ignored
+    reported, before = list[str](), signal.signal(number, signal.default_int_handler)  # under nohup one is ignored
 
     def tell(line: str) -> None:
-        told.append(line)
+        reported.append(line)
         os.kill(os.getpid(), number)
 
     served = serve_study(
@@ -87,21 +87,21 @@ def test_signals_end_it_from_the_moment_on_that_its_address_is_printed(number: s
         asyncio.run(served)  # no KeyboardInterrupt
     finally:
         signal.signal(number, before)
-    assert "Ctrl-C ends it" in told[0]
+    assert "Ctrl-C ends it" in reported[0]
 
 
 def test_a_second_page_is_informed_that_the_seat_is_taken_and_the_first_stays(tmp_path: Path):
     server = server_of(tmp_path / "study")
     with served(server) as where:
         with page_at(where) as first:
-            assert told(first, "screen")["screen"] == "language"
+            assert reported(first, "screen")["screen"] == "language"
             with page_at(where) as second:
-                assert told(second, "gone") == "seat_taken"
+                assert reported(second, "gone") == "seat_taken"
             act(first, "language", "de")
-            assert told(first, "screen")["screen"] == "consent"
+            assert reported(first, "screen")["screen"] == "consent"
         until(lambda: server.seat._page is None)  # type: ignore
         with page_at(where) as third:
-            assert told(third, "screen")["screen"] == "consent"
+            assert reported(third, "screen")["screen"] == "consent"
 
 
 def test_what_is_no_message_of_the_page_is_refused_with_the_reason(tmp_path: Path, wording: Wording):
@@ -121,9 +121,9 @@ def test_what_is_no_message_of_the_page_is_refused_with_the_reason(tmp_path: Pat
             "[" * 5000,
         ):
             page.send(text)
-            wording.check(told(page, "refused"))
+            wording.check(reported(page, "refused"))
         act(page, "language", "en")
-        assert told(page, "screen")["screen"] == "consent"
+        assert reported(page, "screen")["screen"] == "consent"
 
 
 def test_a_page_that_floods_is_refused_and_at_last_put_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -133,8 +133,8 @@ def test_a_page_that_floods_is_refused_and_at_last_put_out(tmp_path: Path, monke
         with contextlib.suppress(ConnectionClosed):
             for _ in range(1000):
                 page.send('{"drawn": []}')
-        assert "more than 20 messages in a second" in told(page, "refused")
-        assert told(page, "gone") == "flood"
+        assert "more than 20 messages in a second" in reported(page, "refused")
+        assert reported(page, "gone") == "flood"
 
 
 def test_a_message_beyond_all_bounds_ends_the_connection_with_the_reason(tmp_path: Path):
@@ -143,7 +143,7 @@ def test_a_message_beyond_all_bounds_ends_the_connection_with_the_reason(tmp_pat
             with connect(f"ws://{where}/{path}", open_timeout=60.0, origin=f"http://{where}") as device:  # type: ignore
                 device.send("x" * 200_000)
                 with pytest.raises(ConnectionClosed) as closed:
-                    told(device, "nothing")
+                    reported(device, "nothing")
                 assert closed.value.rcvd is not None
                 assert closed.value.rcvd.reason == "frame exceeds limit of 80000 bytes"
                 assert closed.value.rcvd.code == 1009

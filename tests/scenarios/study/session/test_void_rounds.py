@@ -20,10 +20,10 @@ from support.scenarios.study_server import (
     act,
     page_at,
     page_of,
+    reported,
     served,
     server_of,
     to_round,
-    told,
     without_runs,  # noqa: F401
 )
 from support.wording import Wording
@@ -47,7 +47,7 @@ def test_samples_that_cannot_be_used_are_refused_and_the_round_goes_on(tmp_path:
         wrong = ({"p_WH": [1.0, 0.0]}, {"p_WH": [9.0, 0.0, 0.0]}, {"stamp": "now"}, {"stamp": 0.5})
         for message in (*({"hand": {**HAND, "stamp": 1.0, **sample}} for sample in wrong), {"drawn": [-1.0]}):
             page.send(json.dumps(message))
-            wording.check(told(page, "refused"))
+            wording.check(reported(page, "refused"))
         seen = time_seen(page)
         assert time_seen(page) > seen
     assert StudyFolder.opened(tmp_path / "study", PLAN).session(1).records == {}
@@ -74,7 +74,7 @@ def test_a_page_that_is_closed_makes_its_round_void_and_it_is_played_again(
             to_round(page)
             page.send(json.dumps({"hand": {**HAND, "stamp": 1.0}}))
         with page_at(where) as reloaded:  # while the run of the page that has gone is ended
-            assert told(reloaded, "screen")["screen"] == "void"
+            assert reported(reloaded, "screen")["screen"] == "void"
     attempts = StudyFolder.opened(tmp_path / "study", PLAN).session(1).notes.void_attempts
     assert [(a.number, a.attempt) for a in attempts] == [(1, 1)], attempts
     assert "the page was closed" in attempts[0].reason
@@ -91,7 +91,7 @@ def test_who_withdraws_in_a_round_sees_nothing_but_that_and_no_attempt_is_kept(
         to_round(page)
         page.send(json.dumps({"hand": {**HAND, "stamp": 1.0}}))
         act(page, "withdraw")
-        assert told(page, "screen")["screen"] == "withdrawn"
+        assert reported(page, "screen")["screen"] == "withdrawn"
         page.send('{"clock": 1.0}')  # nothing else is shown after it
         with contextlib.suppress(TimeoutError):
             while message := page.recv(timeout=0.5):
@@ -106,11 +106,11 @@ def test_a_device_that_falls_silent_makes_the_round_void(tmp_path: Path, monkeyp
     monkeypatch.setattr(seat_module, "SILENCE", 0.5)
     with page_of(server_of(tmp_path / "study")) as page:
         to_round(page)
-        shown = told(page, "screen")
+        shown = reported(page, "screen")
         assert shown["screen"] == "void"
         assert "no sample of the hand" in shown["reason"]
         act(page, "next")
-        assert told(page, "screen")["round"] == 1
+        assert reported(page, "screen")["round"] == 1
 
 
 class RecordedTrial:
@@ -161,7 +161,7 @@ def test_a_run_that_is_killed_makes_its_round_void(tmp_path: Path):
         assert time_seen(page) >= 0.0
         (trial,) = with_argument(os.getpid(), "handover.scenarios.study.session")
         os.kill(trial, signal.SIGKILL)
-        shown = told(page, "screen")
+        shown = reported(page, "screen")
         assert (shown["screen"], shown["again"]) == ("void", True)
         assert "the simulation's process ended (killed by signal 9)" in shown["reason"]
     assert StudyFolder.opened(tmp_path / "study", PLAN).session(1).records == {}

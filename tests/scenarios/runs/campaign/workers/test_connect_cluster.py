@@ -80,7 +80,7 @@ def test_a_command_that_is_killed_leaves_no_run_on_the_cluster(address: str, nan
 
 
 @pytest.mark.parametrize(
-    ("file", "text", "told"),
+    ("file", "text", "reported"),
     [
         (
             "handover_cosim-9.9.dist-info/METADATA",
@@ -91,7 +91,7 @@ def test_a_command_that_is_killed_leaves_no_run_on_the_cluster(address: str, nan
     ],
 )
 def test_a_worker_of_another_version_or_without_this_package_is_refused(
-    file: str, text: str, told: str, address: str, tmp_path: Path
+    file: str, text: str, reported: str, address: str, tmp_path: Path
 ):
     (tmp_path / file).parent.mkdir(exist_ok=True)
     (tmp_path / file).write_text(text)
@@ -99,7 +99,7 @@ def test_a_worker_of_another_version_or_without_this_package_is_refused(
     with (
         worker(tmp_path, address, PYTHONPATH=places),
         connect_cluster(address) as pool,
-        pytest.raises(PoolError, match=rf"worker tcp://[\d.:]+ {told}"),
+        pytest.raises(PoolError, match=rf"worker tcp://[\d.:]+ {reported}"),
     ):
         pool.check(tmp_path)
 
