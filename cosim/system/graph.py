@@ -79,8 +79,8 @@ def _near_each_other(units: Sequence[str], pairs: Collection[Pair]) -> dict[str,
     return {name: 2.0 * (layout[name] - low) / np.maximum(high - low, 1e-9) - 1.0 for name in units}
 
 
-_COLOURS = ("#2f6db5", "#d1602b", "#3c8d53", "#8357a8", "#a37a10", "#4d5866", "#c2487f", "#1f8a94", "#7d5a3c")
-"""Of units, in turn, where a page has no colours `--c0` and on."""
+COLOURS = ("#2f6db5", "#d1602b", "#3c8d53", "#8357a8", "#a37a10", "#4d5866", "#c2487f", "#1f8a94", "#7d5a3c")
+"""Of units and of curves, in turn; the same as `--c0` and on of a report's page in its light scheme."""
 _WIDTH, _HEIGHT = 720, 400
 _LEAST_WIDTH, _LINE_HEIGHT, _LETTER, _ICON = 120, 15, 6.6, 36
 """Least width of a unit's box, height of a line of text in it, width of a letter, size of an icon, pixels."""
@@ -154,7 +154,7 @@ def graph_svg(units: Sequence[DrawnUnit], signals: Mapping[Pair, Sequence[str]])
     low = drawn.min(axis=0) - _GAP
     width, height = (drawn.max(axis=0) + _GAP - low).round()
     at, curves = {n: p - low for n, p in at.items()}, {pair: points - low for pair, points in curves.items()}
-    colour = {n: f"var(--c{k % len(_COLOURS)}, {_COLOURS[k % len(_COLOURS)]})" for k, n in enumerate(names)}
+    colour = {n: f"var(--c{k % len(COLOURS)}, {COLOURS[k % len(COLOURS)]})" for k, n in enumerate(names)}
     heads = {pair: _head(points, at, boxes) for pair, points in curves.items()}
     titles = {(a, b): "\n".join([f"{a} \N{RIGHTWARDS ARROW} {b}", *of]) for (a, b), of in between.items()}
     lines = [_arrow(curves[pair], heads[pair], colour[pair[0]], titles[pair]) for pair in between]

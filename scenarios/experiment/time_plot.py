@@ -10,10 +10,8 @@ import numpy as np
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
+from handover.cosim.system.graph import COLOURS
 from handover.scenarios.experiment.returned_types import Checked, Expected, is_number, is_series, sequence_of
-
-COLOURS = ("#2f6db5", "#d1602b", "#3c8d53", "#8357a8", "#a37a10", "#4d5866", "#c2487f", "#1f8a94", "#7d5a3c")
-"""Colours of curves, in the order of use; the same as `var(--c0)` and on of page.css in its light scheme."""
 
 _MARGIN = 0.06
 """Margin between what is drawn and the end of an axis, as a share of the axis."""
