@@ -21,6 +21,7 @@ from support.wording import write_golden
 
 # Else each process rewrites and compiles all tests and the package anew, which takes longer than most of them.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+os.environ.pop("COLUMNS", None)  # of a terminal: what commands print into pipes would be as wide
 sys.dont_write_bytecode = False
 
 # Where other processes have the cores, BLAS spins: small matrices in two threads take twenty times the CPU time.

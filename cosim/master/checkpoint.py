@@ -98,8 +98,8 @@ class Checkpoint:
         """Restore this run in a master that has been entered.
 
         Raises:
-            UnitFailure: a unit does not accept its state. CosimError: the master has other units, or the checkpoint's
-                parts do not fit them.
+            UnitFailure: a unit does not accept its state.
+            CosimError: the master has other units, or the checkpoint's parts do not fit them.
         """
         if set(self.units) != set(master.system.units):
             raise CosimError(f"a checkpoint of the units {', '.join(self.units)}, not of these")
@@ -308,7 +308,8 @@ class Checkpointer:
         """Write a checkpoint if one is due, unless a unit has ended the run, which cannot be resumed.
 
         Raises:
-            UnitFailure: a unit does not give its state. RecordNotWritten: the record cannot be written.
+            UnitFailure: a unit does not give its state.
+            RecordNotWritten: the record cannot be written.
         """
         if t >= self._next and self._master.ended is None:
             self.write()

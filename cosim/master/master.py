@@ -106,7 +106,8 @@ class Master:
             last step as its stop time, beyond which it need not step. Without, units have no stop time.
 
     Raises:
-        WiringError: the system has faults. InvalidFmu: an FMU is invalid, see `MasterOptions.strict`.
+        WiringError: the system has faults.
+        InvalidFmu: an FMU is invalid, see `MasterOptions.strict`.
         ScheduleError: see `StepperFactory`; or there are more steps until the stop time than can be done.
         InitializationError: a unit did not accept its parameters or did not initialise.
         UnitHung: one did not return; UnitCrashed: an isolated one ended its process.
@@ -272,7 +273,8 @@ class Master:
         """Run another job with the units in the thread that they are called in, with the same time limit.
 
         Raises:
-            RuntimeError: the units are freed. UnitHung: a unit does not return. Whatever else the job raises.
+            RuntimeError: the units are freed.
+            UnitHung: a unit does not return. Whatever else the job raises.
         """
         self._check_is_entered()
         mark_as_host()

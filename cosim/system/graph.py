@@ -163,8 +163,8 @@ def graph_svg(units: Sequence[DrawnUnit], signals: Mapping[Pair, Sequence[str]])
     label = html.escape(f"graph of {counted(len(names), 'unit')}. {listed}")
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:g} {height:g}" width="{width:g}" role="img" '
-        f'aria-label="{label}" style="background: var(--page, #fff); font: 12px sans-serif">'
-        f"{''.join(lines)}{''.join(shown)}</svg>"
+        f'aria-label="{label}" style="--least-width: {0.8 * width:.0f}px; background: var(--page, #fff); '
+        f'font: 12px sans-serif">{"".join(lines)}{"".join(shown)}</svg>'
     )
 
 

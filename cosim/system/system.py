@@ -79,7 +79,7 @@ class System:
         self.externals: dict[PortName, ExternalSource] = {}
         """By input, the sources of inputs that come from outside."""
         self.notes: list[str] = []
-        """What who runs it should know before it starts, in lines: such as connections and values that its units do not
+        """What who runs it should know before it starts, in lines, such as connections and values that its units do not
         have and need not have."""
         self._faults: list[str] = []
         self._step_faults: dict[str, NoStep] = {}  # by unit that has no communication step

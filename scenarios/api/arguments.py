@@ -59,7 +59,9 @@ def errors_for_python(
         elsewhere: arguments of other functions that it has not, with what is right instead.
 
     Raises:
-        InvalidInput: see there. UnitFailure: a unit failed before anything ran. RecordNotWritten: the disk is full.
+        InvalidInput: see there.
+        UnitFailure: a unit failed before anything ran.
+        RecordNotWritten: the disk is full.
             ClusterLost: a campaign's workers were lost.
     """
     try:

@@ -79,7 +79,7 @@ class Campaign:
 
     @property
     def rows(self) -> list[dict[str, Any]]:
-        """A row for each run that has ended: parameters, seed, status, success, reason, times, metrics; see `unit`."""
+        """A row for each run that has ended, with parameters, seed, status, verdict, times and metrics; see `unit`."""
         return self._results.table.rows
 
     def unit(self, column: str) -> str:

@@ -86,7 +86,8 @@ class ScenarioEnvironment(gymnasium.Env[Values, Values]):
         """Begin an episode; return the observation at 0 s and information.
 
         Raises:
-            InvalidInput: `options` has some; there are none. UnitFailure: a unit did not start.
+            InvalidInput: `options` has some; there are none.
+            UnitFailure: a unit did not start.
         """
         if options:
             raise InvalidInput(
@@ -110,7 +111,8 @@ class ScenarioEnvironment(gymnasium.Env[Values, Values]):
         The last period is shorter where the scenario's stop time is within it.
 
         Raises:
-            InvalidInput: the action is not one of the space. RuntimeError: there is no running episode.
+            InvalidInput: the action is not one of the space.
+            RuntimeError: there is no running episode.
         """
         session = self.session
         if session is None:

@@ -27,7 +27,8 @@ class Page:
         """Write the page to a file, whose folder is made, and return it with that as its path.
 
         Raises:
-            InvalidInput: it is not a path. RecordNotWritten: it cannot be written.
+            InvalidInput: it is not a path.
+            RecordNotWritten: it cannot be written.
         """
         file = path_of("path", path)
         make_folder_of(file)

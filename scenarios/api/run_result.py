@@ -149,7 +149,8 @@ class Run:
         """Draw signals over time, below each other, with units at the axes; into `axes` where they are given.
 
         Raises:
-            KeyError: there is no such signal; the nearest names are given. InvalidInput: matplotlib is not installed.
+            KeyError: there is no such signal; the nearest names are given.
+            InvalidInput: matplotlib is not installed.
         """
         with errors_for_python():
             from handover.scenarios.api.signal_plots import plot_signals  # matplotlib takes long to load

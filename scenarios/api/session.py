@@ -86,7 +86,8 @@ class Session:
         those that are given or set, as it does of a unit that has no others.
 
         Raises:
-            InvalidInput: see `OpenSystem`. CosimError: see `Master`.
+            InvalidInput: see `OpenSystem`.
+            CosimError: see `Master`.
         """
         self._open = OpenSystem(system, left_out)
         self.stop = float(experiment.stop_time(parameters))
@@ -135,7 +136,8 @@ class Session:
         Durations add up exactly: ten steps of 0.1 s end at 1 s. It ends before where the task is over.
 
         Raises:
-            InvalidInput: the duration is none. UnitFailure: a unit failed; the session can only be closed then.
+            InvalidInput: the duration is none.
+            UnitFailure: a unit failed; the session can only be closed then.
             RuntimeError: a unit failed before, or has ended the simulation.
         """
         return self._run(self._asked + positive_seconds("duration", duration))
@@ -152,7 +154,8 @@ class Session:
         """Return a copy of a signal's value: a number, an array, or a text; enumerations as numbers, see `text`.
 
         Raises:
-            KeyError: there is no such port; the nearest names are given. UnitFailure: a unit does not give it.
+            KeyError: there is no such port; the nearest names are given.
+            UnitFailure: a unit does not give it.
         """
         unit, port = self._open.split(name)
         if self._open.place is not None and unit == self._open.place.unit.name:
@@ -174,7 +177,8 @@ class Session:
 
         Raises:
             KeyError: there is no such port; the nearest names are given.
-            InvalidInput: it cannot be set, or not to this value. UnitFailure: the unit does not take it.
+            InvalidInput: it cannot be set, or not to this value.
+            UnitFailure: the unit does not take it.
         """
         unit, port = self._open.split(name)
         if self._open.place is not None and unit == self._open.place.unit.name:
@@ -199,7 +203,8 @@ class Session:
         """Return the whole state, to which `restore` goes back, also in another session of the same system.
 
         Raises:
-            InvalidInput: a unit cannot save its state. UnitFailure: one fails to do so.
+            InvalidInput: a unit cannot save its state.
+            UnitFailure: one fails to do so.
         """
         with errors_for_python():
             check_states(self._open.system)

@@ -100,7 +100,8 @@ def sweep(
         InvalidInput: something of it cannot be run, with all faults and what would be right, or the extra `campaigns`
             is not installed; nothing is written.
         KeyboardInterrupt: Ctrl-C; runs that have ended are kept.
-        RecordNotWritten: the disk is full. ClusterLost: all workers were lost; runs that have ended are kept.
+        RecordNotWritten: the disk is full.
+        ClusterLost: all workers were lost; runs that have ended are kept.
     """
     given = merged(parameters, named)
     with errors_for_python(named, sweep):
@@ -155,7 +156,8 @@ def _name_of(scenario: object) -> str:
     """Return the name by which the processes of runs find a scenario.
 
     Raises:
-        UsageError: it is none. InvalidInput: it is a class that they cannot find.
+        UsageError: it is none.
+        InvalidInput: it is a class that they cannot find.
     """
     if isinstance(scenario, Path):
         return str(scenario)

@@ -18,8 +18,8 @@ from handover.cosim.fmu.host_process import copied
 
 
 def open_console() -> Console:
-    """Return a console on standard output: in colours and as wide as the terminal, plain and wide when piped."""
-    return _Console(highlight=False, width=None if sys.stdout.isatty() else 160)
+    """Return a console on standard output: coloured and as wide as the terminal; piped plain, as wide as COLUMNS."""
+    return _Console(highlight=False, width=None if sys.stdout.isatty() or "COLUMNS" in os.environ else 160)
 
 
 def print_rows(console: Console, rows: Iterable[tuple[str, ...]]) -> None:

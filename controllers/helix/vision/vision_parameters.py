@@ -113,7 +113,7 @@ class Params(CamerasAndMarkers):
     )
     decimation: int = parameter(
         1,
-        "of 30 pairs of pictures a second, every so many-th is looked at",
+        "how many of the 30 pairs of pictures a second there are to one that is looked at",
         minimum=1,
         maximum=300,
         origin=assumed("every picture is taken; scenarios set it"),

@@ -83,7 +83,7 @@ class Params(CamerasAndMarkers, BowlParameters):
     )
     decimation: int = parameter(
         1,
-        "of 30 pictures a second, every so many-th is taken",
+        "how many of the 30 pictures a second there are to one that is taken",
         minimum=1,
         maximum=300,
         origin=assumed("every picture is taken; scenarios set it"),

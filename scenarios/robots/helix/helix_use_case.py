@@ -135,7 +135,8 @@ class UseCaseEvaluator(HandoverEvaluator):
 
     def _success(self) -> str:
         offset = 0.0 if self._crossed is None else 1e3 * _length(self._crossed)
-        return f"the ball rests in the bowl since {self._moved_at:.1f} s; it fell in {offset:.0f} mm beside the middle"
+        since = f"the ball has rested in the bowl since {self._moved_at:.1f} s"
+        return f"{since}; it fell in {offset:.0f} mm beside the middle"
 
     def _failure(self, handover: Outcome) -> str:
         if self._released_at is None:

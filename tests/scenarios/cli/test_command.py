@@ -35,6 +35,12 @@ def test_lists_have_robots_scenarios_units_and_their_parameters_and_ports():
     assert "shape real[25,3] m" in arm
 
 
+def test_what_is_piped_is_as_wide_as_columns_says(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("COLUMNS", "60")
+    rows = [line for line in call("list", "ir_grasp").output.splitlines() if line.startswith("  ")]
+    assert max(map(len, rows)) == 60
+
+
 def test_what_others_have_written_does_not_steer_the_terminal(capsys: pytest.CaptureFixture[str]):
     escapes = "\x1b[31m\x1b]0;x\x07\u202e"
     say(escapes)

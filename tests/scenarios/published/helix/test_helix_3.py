@@ -12,7 +12,7 @@ from handover.scenarios.runs.campaign.table import CampaignTable
 
 def table_of(failed: int = 0) -> CampaignTable:
     """Return the plan's runs, the first so many of the thesis's failed."""
-    reasons = ("the ball rests in the bowl", "the ball missed the bowl by 0.010 m: it fell")
+    reasons = ("the ball has rested in the bowl", "the ball missed the bowl by 0.010 m: it fell")
     return made_table(
         {**run.parameters, "status": "done", "run": f"{k:03}"}
         | {"success": k >= failed, "reason": reasons[k < failed], "drop_offset": 0.01 + 1e-4 * k}
