@@ -111,7 +111,7 @@ def scenario(kind: type[Experiment[Any]]) -> dict[str, Any]:
         rows[f"`{place}`"] = _rows(name, declared)
     assumed = {of: [r.name for r, origin in listed if origin.startswith("assumed")] for of, listed in rows.items()}
     ports = {
-        place: [(row(p.declared, Form.FMI3), p.declared.causality.value, p.is_required, p.sentence)
+        place: [(row(p.declared, Form.FMI3), p.declared.causality.value, p.is_required, p.text)
                 for p in ports_of_place(needs, UNITS[kind.units[place]])]
         for place, needs in kind.places.items()
     }  # fmt: skip

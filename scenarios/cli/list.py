@@ -233,7 +233,7 @@ def place_data(experiment: type[Experiment[Any]], name: str) -> dict[str, Any]:
             **variable_data(p.declared),
             "causality": p.declared.causality.value,
             "required": p.is_required,
-            "description": p.sentence,
+            "description": p.text,
         }
         for p in checked_ports_of_place(experiment, name, own)
     ]
@@ -265,7 +265,7 @@ def print_place(experiment: type[Experiment[Any]], name: str) -> None:
             (Causality.PARAMETER, "Parameters"),
         ):
             rows = [
-                (p.declared.name, type_of(p.declared), allowed(p.declared), p.sentence)
+                (p.declared.name, type_of(p.declared), allowed(p.declared), p.text)
                 for p in ports
                 if p.is_required is is_required and p.declared.causality is causality
             ]

@@ -40,11 +40,22 @@ class Place:
 
 @dataclass(frozen=True)
 class PlacePort:
-    """An input, output or parameter of a place: as the scenario's own unit declares it, and all to know of it."""
+    """An input, output or parameter of a place.
+
+    Attributes:
+        declared: as the scenario's own unit declares it.
+        is_required: whether a unit must have it.
+        addition: what the place adds to its description; "" where that says it all.
+    """
 
     declared: Variable
     is_required: bool
-    sentence: str
+    addition: str
+
+    @property
+    def text(self) -> str:
+        """All to know of it: the unit's description, and what the place adds."""
+        return "; ".join(text for text in (self.declared.description, self.addition) if text)
 
 
 def ports_of_place(place: Place, unit: Entry) -> list[PlacePort]:
@@ -55,16 +66,10 @@ def ports_of_place(place: Place, unit: Entry) -> list[PlacePort]:
     """
     declared = {v.name: v for v in describe(import_class(unit.block)).variables}
     return [
-        PlacePort(declared[name], is_required, _sentence(declared[name].description, more))
+        PlacePort(declared[name], is_required, addition)
         for is_required, named in ((True, place.required), (False, place.optional))
-        for name, more in named.items()
+        for name, addition in named.items()
     ]
-
-
-def _sentence(description: str, more: str) -> str:
-    """Return a description, and those clauses on the place that it does not have itself."""
-    known = f"{description}, in W" if "in the world" in description else description
-    return "; ".join(text for text in (description, *(c for c in more.split("; ") if c not in known)) if text)
 
 
 def fit_places(system: System, places: Mapping[str, Place], units: Mapping[str, str], scenario: str) -> None:
@@ -173,7 +178,7 @@ class _Fitting:
         meant = suggestion(v.name, others) or did_you_mean(like)
         by_name = f"; {meant}" if meant else ""
         hint = f"; its {v.name} is an {elsewhere.value}" if elsewhere else by_name
-        return f"{self._what} needs the {v.causality.value} {v.name} ({signature(v)}): {port.sentence}{hint}"
+        return f"{self._what} needs the {v.causality.value} {v.name} ({signature(v)}): {port.text}{hint}"
 
     def _note(self, absent: Mapping[Causality, Sequence[str]]) -> None:
         """Note what is left out, and which of the unit's inputs nothing feeds: their names may be misspelled."""

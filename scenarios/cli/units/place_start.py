@@ -230,7 +230,7 @@ def _tuple(inputs: Sequence[str]) -> str:
 def _field(declaring: type[Any], port: PlacePort) -> tuple[str, str]:
     """Return what the place adds to a port's description, and the port's declaration in the source."""
     text = _declarations(declaring)[port.declared.name]
-    return port.sentence.removeprefix(port.declared.description).lstrip("; "), text
+    return port.addition, text
 
 
 def _declarations(declaring: type[Any]) -> dict[str, str]:

@@ -6,30 +6,32 @@ from handover.scenarios.experiment.places import Place
 
 _FRAMES = (
     "W is the world, without gravity. B is the robot's frame, with its origin in its centre of mass; G, the gripper, "
-    "has the axes of B and stands at p_BG. Quaternions are scalar first, of the frame's orientation in W.",
+    "has the axes of B and stands at p_BG. Vectors are in W where nothing else is said. Commands of force and "
+    "torque, what the thrusters make of them, inertia and p_BG are in B. Quaternions are scalar first, of the "
+    "frame's orientation in W.",
 )
 _ESTIMATE = {
-    "p_WB_meas": "in W",
-    "q_WB_meas": "scalar first",
-    "v_WB_meas": "in W",
-    "w_WB_meas": "in W",
+    "p_WB_meas": "",
+    "q_WB_meas": "",
+    "v_WB_meas": "",
+    "w_WB_meas": "",
 }
-_TRUTH = {"p_WB": "in W", "q_WB": "scalar first", "v_WB": "in W", "w_WB": "in W"}
-_WRENCH = {"f_B": "at the centre of mass, in B", "tau_B": "in B"}
-_ON_GRIPPER = {"f_G": "at G, in W", "tau_G": "in W"}
-_AT_GRIPPER = {"p_WG": "in W", "q_WG": "scalar first", "v_WG": "in W"}
-_MOTION = {**_AT_GRIPPER, "w_WG": "in W"}
+_TRUTH = {"p_WB": "", "q_WB": "", "v_WB": "", "w_WB": ""}
+_WRENCH = {"f_B": "", "tau_B": ""}
+_ON_GRIPPER = {"f_G": "", "tau_G": ""}
+_AT_GRIPPER = {"p_WG": "", "q_WG": "", "v_WG": ""}
+_MOTION = {**_AT_GRIPPER, "w_WG": ""}
 _BODY = {
     "mass": "as the scenario's factors make it",
-    "I_B": "in B, by the same factors",
-    "p_BG": "in B, by the same factors",
+    "I_B": "by the same factors",
+    "p_BG": "by the same factors",
 }
 _CONTROLLER = Place(
-    required={"f_cmd": "at the centre of mass, in B", "tau_cmd": "in B"},
+    required={"f_cmd": "at the centre of mass", "tau_cmd": ""},
     optional={
         **_ESTIMATE,
-        "p_WG_goal": "in W",
-        "q_WG_goal": "scalar first",
+        "p_WG_goal": "",
+        "q_WG_goal": "",
         "active": "a controller that is not active is to command zeros: the thrusters add all commands",
         "error_p": "shown as a signal",
         "error_R": "shown as a signal",
@@ -52,7 +54,7 @@ _POSE = Place(
 
 
 def _thrusters(*controllers: str) -> Place:
-    commands = {f"{what}_{name}": "in B" for name in controllers for what in ("f", "tau")}
+    commands = {f"{what}_{name}": "" for name in controllers for what in ("f", "tau")}
     return Place(
         required={**commands, **_WRENCH, "saturated": "its share of the run is a metric"},
         optional={
@@ -67,9 +69,9 @@ _ROBOT = Place(
     required={**_WRENCH, **_ON_GRIPPER, **_TRUTH, **_AT_GRIPPER},
     optional={
         **_BODY,
-        "p_WB_0": "in W",
-        "f_P": "in W, of a person's push in a live page, which cannot push without it",
-        "p_BP": "in B, where that acts",
+        "p_WB_0": "",
+        "f_P": "a live page cannot push without it",
+        "p_BP": "",
     },
     remarks=_FRAMES,
 )
@@ -102,7 +104,7 @@ _ARM = {
 PLACES_OF_ARM_PUSH = {
     **PLACES_OF_PUSH,
     "impedance": Place(
-        required={**_CONTROLLER.required, "tau_J_cmd": "on the joints"},
+        required={**_CONTROLLER.required, "tau_J_cmd": ""},
         optional={
             **_CONTROLLER.optional,
             **_ARM,
@@ -113,14 +115,14 @@ PLACES_OF_ARM_PUSH = {
         remarks=_FRAMES,
     ),
     "robot": Place(
-        required={**_ROBOT.required, "tau_J": "on the joints", "q_J": "", "v_J": "", "w_WG": "in W"},
+        required={**_ROBOT.required, "tau_J": "", "q_J": "", "v_J": "", "w_WG": ""},
         optional={
             **_ROBOT.optional,
             **_ARM,
             "q_J_0": "the scenario's parameter posture",
             "friction_J": "the scenario's parameter",
-            "f_Q": "in W, of a person's push on the gripper in a live page, which cannot push it without",
-            "p_GQ": "in G, where that acts",
+            "f_Q": "a live page cannot push the gripper without it",
+            "p_GQ": "",
         },
         remarks=_FRAMES,
     ),
@@ -132,22 +134,22 @@ PLACES_OF_HANDOVER = {
         required={
             "impedance": "whether the unit impedance is to be active",
             "pose": "whether the unit pose is to be active",
-            "p_WG_goal": "in W",
-            "q_WG_goal": "scalar first",
+            "p_WG_goal": "",
+            "q_WG_goal": "",
             "closure": "",
             "light": "by it the person knows when to act",
             "phase": "by it the run is judged, and ends",
             "failed_receptions": "the person may be to feign some",
-            "speed_G": "of the gripper",
+            "speed_G": "",
         },
         optional={
             **_ESTIMATE,
             "gripper_angle": "",
             "failed_deliveries": "a metric, 0 without it",
             **dict.fromkeys(("task", "behaviour"), "the scenario's, or its parameter's value"),
-            "p_BG": "in B",
-            "p_WO_0": "in W",
-            "p_OG": "from the object's centre, in W",
+            "p_BG": "",
+            "p_WO_0": "",
+            "p_OG": "",
         },
         remarks=_FRAMES,
     ),
@@ -161,25 +163,25 @@ PLACES_OF_HANDOVER = {
             "closure": "",
             "light": "",
             "gripper_angle": "",
-            "p_WO": "in W",
-            "q_WO": "scalar first",
-            "p_WH": "in W",
-            "q_WH": "scalar first",
+            "p_WO": "",
+            "q_WO": "",
+            "p_WH": "",
+            "q_WH": "",
             "finger": "shown in space",
             "holder": "by it the run is judged",
-            "f_H": "in W; shown over time",
+            "f_H": "shown over time",
             "motion": "the scenario's",
             "object_with": "the scenario's",
         },
         optional={
-            "v_WO": "in W",
+            "v_WO": "",
             "activity": "by it, with f_H, the run says why a handover failed",
             **dict.fromkeys(
                 ("p_WH_goal", "q_WH_goal", "finger_goal", "closed_goal"), "of what `handover flyer-track` writes"
             ),
             "motion_again": "the scenario's",
             "seed": "follows from the run's seed",
-            "p_WO_0": "in W",
+            "p_WO_0": "",
             "angle_0": "",
             **dict.fromkeys(
                 ("driven_by", "track"),
@@ -223,8 +225,8 @@ PLACES_OF_TEAM = {
             {
                 "impedance": "whether the robot's unit impedance is to be active",
                 "pose": "whether its unit pose is to be active",
-                "p_WG_goal": "in W",
-                "q_WG_goal": "scalar first",
+                "p_WG_goal": "",
+                "q_WG_goal": "",
                 "closure": "",
                 "light": "by both the person knows when to act",
                 "phase": "by it the run is judged, and ends",
@@ -235,8 +237,8 @@ PLACES_OF_TEAM = {
         optional={
             **_of_each({**_ESTIMATE, "gripper_angle": "", "failed_deliveries": "a metric, 0 without it"}),
             **dict.fromkeys(("task", "behaviour"), "the scenario's parameter, or follows from it"),
-            "p_BG": "in B",
-            "p_WO_0": "in W",
+            "p_BG": "",
+            "p_WO_0": "",
             "p_OG": "in the object's frame, the middle between its handles",
             "grip_spacing": "between the handles, along y of the object",
         },
@@ -253,14 +255,14 @@ PLACES_OF_TEAM = {
                     "closure": "",
                     "light": "",
                     "gripper_angle": "",
-                    "p_WH": "in W",
-                    "q_WH": "scalar first",
+                    "p_WH": "",
+                    "q_WH": "",
                     "finger": "shown in space",
-                    "f_H": "in W",
+                    "f_H": "",
                 }
             ),
-            "p_WO": "in W",
-            "q_WO": "scalar first",
+            "p_WO": "",
+            "q_WO": "",
             "grippers_holding": "by it the run is judged",
             "hands_holding": "by it the run is judged",
             "motion": "follows from the scenario's parameter task",
@@ -269,7 +271,7 @@ PLACES_OF_TEAM = {
         optional={
             "activity": "shown as a signal",
             "seed": "follows from the run's seed",
-            "p_WO_0": "in W",
+            "p_WO_0": "",
             "angle_0": "",
             "p_OG": "as the unit decision has it",
             "grip_spacing": "as the unit decision has it",

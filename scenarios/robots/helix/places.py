@@ -6,7 +6,9 @@ from handover.scenarios.experiment.places import Place
 
 _BASE = (
     "W is the world: its origin is the arm's mount, z points up, x away from the cameras, y to their left. B is the "
-    "arm's base frame, with z down along the hanging arm: R_WB = diag(1, -1, -1)."
+    "arm's base frame, with z down along the hanging arm: R_WB = diag(1, -1, -1). z of the ring R points along "
+    "the arm, away from the mount, z of the gripper G to its tip. Vectors are in W where nothing else is said. "
+    "Quaternions are scalar first, of the frame's orientation in W."
 )
 _CALIBRATION = {
     f"{what}_{side}": ""
@@ -15,16 +17,16 @@ _CALIBRATION = {
 }  # fmt: skip
 _THIRD = "with cameras=three alone"
 _SEEN = {
-    "p_WO_meas": "in W; while it is not seen, the last one, zeros before any",
-    "p_WR_meas": "in W; the wrist carries the marker ring, at the end of the arm's centre line",
-    "p_WG_meas": "in W; the gripper is 0.1 m beyond the wrist, along the ring's axis",
+    "p_WO_meas": "while it is not seen, the last one, zeros before any",
+    "p_WR_meas": "the wrist carries the marker ring, at the end of the arm's centre line",
+    "p_WG_meas": "the gripper is 0.1 m beyond the wrist, along the ring's axis",
     "seen_O": "in these pictures",
     "seen_R": "in these pictures",
 }
 _COVARIANCES = {
-    "cov_O": "in W; large while it is not seen",
-    "cov_R": "in W; large while it is not seen",
-    "cov_G": "in W; large while it is not seen",
+    "cov_O": "large while it is not seen",
+    "cov_R": "large while it is not seen",
+    "cov_G": "large while it is not seen",
 }
 
 _TUNED = dict.fromkeys(
@@ -40,14 +42,14 @@ PLACES = {
     "camera": Place(
         required={"left": "", "right": ""},
         optional={
-            "backbone": "in W",
-            "p_WR": "in W",
-            "q_WR": "of W's frame, scalar first; z of the ring points along the arm, away from the mount",
-            "p_WG": "in W",
-            "q_WG": "of W's frame, scalar first; z of the gripper points to its tip",
+            "backbone": "",
+            "p_WR": "",
+            "q_WR": "",
+            "p_WG": "",
+            "q_WG": "",
             "grip": "",
-            "p_WO": "in W",
-            "p_WH": "in W",
+            "p_WO": "",
+            "p_WH": "",
             "third": _THIRD,
             **_CALIBRATION,
             "seed": "follows from the run's seed",
@@ -86,13 +88,13 @@ PLACES = {
             **_COVARIANCES,
             "phase": "by it, time and success of the handover are judged: it fails in GIVEN_UP",
             "error": "shown, and by it the run says how near the arm came",
-            "verdict": "by it the run says why it was given up",
+            "verdict": "part of the reason why the run failed",
             "tilt": "shown as a signal",
             "q_est": "shown as a signal",
             "q_sys": "compared with p_WG_est as the gripper begins to close, as in fig. 9 of the thesis",
-            "p_WO_est": "in W; shown in plots, pictures and replay",
-            "p_WR_est": "in W; shown in pictures",
-            "p_WG_est": "in W; shown in plots, pictures and replay",
+            "p_WO_est": "shown in plots, pictures and replay",
+            "p_WR_est": "shown in pictures",
+            "p_WG_est": "shown in plots, pictures and replay",
             "control_period": "the unit is stepped so often; by it, control steps are counted",
             "threshold_grasp": "by the scenario's tuning",
             "epsilon_pose_bound": "by the scenario's tuning",
@@ -117,17 +119,17 @@ PLACES = {
     "arm": Place(
         required={
             "dl_t": "as the controller commands it: see the place servo",
-            "p_WR": "in W",
-            "q_WR": "of W's frame, scalar first",
-            "p_WG": "in W",
-            "q_WG": "of W's frame, scalar first; z of the gripper points to its tip",
-            "backbone": "in W",
+            "p_WR": "",
+            "q_WR": "",
+            "p_WG": "",
+            "q_WG": "",
+            "backbone": "",
             "grip": "",
         },
         optional={
             "closure": "",
-            "f_G": "in W; by it a person guides the gripper",
-            "f_P": "in W, of a person's push in a live page, which cannot push without it",
+            "f_G": "by it a person guides the gripper",
+            "f_P": "a live page cannot push without it",
             "tension": "shown over time",
             "EA": "by the scenario's arm_stiffness",
             "EI": "by the scenario's arm_stiffness",
@@ -137,19 +139,19 @@ PLACES = {
     ),
     "hand": Place(
         required={
-            "p_WO": "in W",
-            "p_WH": "in W",
+            "p_WO": "",
+            "p_WH": "",
             "holder": "it is a success if GRIPPER has the ball at the end",
-            "p_WO_0": "in W; follows from the scenario's place, radius and height",
+            "p_WO_0": "follows from the scenario's place, radius and height",
         },
         optional={
-            "f_G": "in W",
-            "f_H": "in W; by it the scenario's hand_force_max is judged",
-            "p_WG": "in W",
-            "q_WG": "of W's frame, scalar first; z of the gripper points to its tip",
+            "f_G": "",
+            "f_H": "by it the scenario's hand_force_max is judged",
+            "p_WG": "",
+            "q_WG": "",
             "grip": "",
             "seed": "follows from the run's seed",
-            "p_WO_1": "in W; where the hand moves on to",
+            "p_WO_1": "",
             "room": "0 in helix_reach, whose hand does not wait",
             "move_for": "0 where the hand stays; else the scenario's parameter",
         },
@@ -159,17 +161,17 @@ PLACES = {
 """By the units' names in the system."""
 
 _FINGERS = {
-    "p_WG": "in W",
-    "q_WG": "of W's frame, scalar first; z of the gripper points to its tip",
+    "p_WG": "",
+    "q_WG": "",
     "grip": "",
-    "p_WO": "in W",
-    "p_WH": "in W",
+    "p_WO": "",
+    "p_WH": "",
     "seed": "follows from the run's seed",
 }
 _CORRECTED = {
-    "p_WO": "in W; where the servo is to take the ball to be",
-    "p_WR": "in W; where the servo is to take the wrist to be",
-    "p_WG": "in W; where the servo is to take the gripper to be",
+    "p_WO": "where the servo is to take the ball to be",
+    "p_WR": "where the servo is to take the wrist to be",
+    "p_WG": "where the servo is to take the gripper to be",
     "known_O": "whether the servo is to take p_WO",
     "known_R": "whether the servo is to take p_WR and p_WG",
 }
@@ -194,14 +196,14 @@ REFLEX_PLACES = {
         optional={
             **_SEEN,
             **_COVARIANCES,
-            "P_O": "in W; covariance of p_WO",
-            "P_R": "in W; covariance of p_WR",
-            "P_G": "in W; covariance of p_WG",
+            "P_O": "",
+            "P_R": "",
+            "P_G": "",
             "ticks": "of the fingers' sensors; see the place fingers",
             "grip": "",
             "dl_t": "see the place servo",
             "q_est": "of the servo: Dx, Dy (rad) and l (m) of each segment, base segment first",
-            "p_GO_est": "in the gripper's frame; compared with the ball's true place, and shown",
+            "p_GO_est": "compared with the ball's true place, and shown",
             "source": "shown over time",
             "deviation": "shown over time",
             "reflectivity": "shown as a signal",

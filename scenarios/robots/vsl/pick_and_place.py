@@ -63,11 +63,11 @@ class VslPickAndPlace(Experiment[PickAndPlaceEvaluator]):
     places: ClassVar[Mapping[str, Place]] = {
         "planner": Place(
             required={
-                "q_ref": "by rigid kinematics, joint 1 first",
-                "qd_ref": "joint 1 first",
+                "q_ref": "",
+                "qd_ref": "",
                 "p_cmd": "",
                 "vacuum": "",
-                "p_WG_goal": "in W; compared with the tip while it carries",
+                "p_WG_goal": "compared with the tip while it carries",
                 "phase": "says what is touched and when",
                 "done": "by it the run ends",
             },
@@ -86,7 +86,7 @@ class VslPickAndPlace(Experiment[PickAndPlaceEvaluator]):
             remarks=PLACES["arm"].remarks,
         ),
         "gripper": Place(
-            required={"p_WG": "in W", "vacuum": "", "load": "", "held": "", "p_WO": "in W; by it the run is judged"},
+            required={"p_WG": "", "vacuum": "", "load": "", "held": "", "p_WO": "by it the run is judged"},
             optional={"landing": "the height of the scenario's parameter place"},
             remarks=PLACES["arm"].remarks,
         ),

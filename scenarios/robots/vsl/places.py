@@ -6,9 +6,11 @@ from handover.controllers.vsl.hybrid_kinematics import Imu
 from handover.cosim.system.system import System
 from handover.scenarios.experiment.places import Place
 
-_WORLD = "W is the world: z points up, and the first joint turns about it; the ground is at z = 0."
-_Q_REF = {"q_ref": "by rigid kinematics, joint 1 first", "qd_ref": "joint 1 first"}
-_COMMAND = {"q_cmd": "joint 1 first", "qd_cmd": "joint 1 first; 0 is as fast as they can"}
+_WORLD = (
+    "W is the world: z points up, and the first joint turns about it; the ground is at z = 0. "
+    "Vectors are in W, and values of joints begin with joint 1."
+)
+_Q_REF = {"q_ref": "", "qd_ref": ""}
 
 PLACES = {
     "planner": Place(
@@ -24,36 +26,37 @@ PLACES = {
         remarks=(_WORLD,),
     ),
     "kinematics": Place(
-        required=_COMMAND,
+        required={"q_cmd": "", "qd_cmd": "0 is as fast as they can"},
         optional={
             **_Q_REF,
-            "q_meas": "joint 1 first; the links' bending is not in it",
+            "q_meas": "the links' bending is not in it",
             "p_meas": "",
-            "i_meas": "joint 1 first",
-            "p_WG_model": "in W; compared with goal and tip",
-            "p_WG_est": "in W; compared with the tip",
+            "i_meas": "",
+            "p_WG_model": "compared with goal and tip",
+            "p_WG_est": "compared with the tip",
             "outside": "its share of the path is a metric",
             "model_mismatch": "its share is a metric where tracker or IMUs are wired",
-            "innovation": "in W",
+            "innovation": "",
             "method": "the scenario's",
-            "p_WG_meas": "in W; wired where the loop is closed",
-            "tilt_meas": "of links 2 and 3; wired where there are IMUs",
+            "p_WG_meas": "wired where the loop is closed",
+            "tilt_meas": "wired where there are IMUs",
         },
         remarks=(_WORLD,),
     ),
     "arm": Place(
         required={
-            **_COMMAND,
-            "q_meas": "joint 1 first",
+            "q_cmd": "",
+            "qd_cmd": "",
+            "q_meas": "",
             "p_meas": "",
-            "i_meas": "joint 1 first",
-            "p_WG": "in W",
-            "p_WG_meas": "in W; by it the run is judged",
-            "shape": "in W",
+            "i_meas": "",
+            "p_WG": "",
+            "p_WG_meas": "by it the run is judged",
+            "shape": "",
         },
         optional={
             "p_cmd": "",
-            "tilt_meas": "of links 2 and 3; wired where there are IMUs",
+            "tilt_meas": "wired where there are IMUs",
             **dict.fromkeys(("link_2", "link_3", "load", "q_0"), "the scenario's parameter"),
             **dict.fromkeys(
                 ("base_step", "encoder_step", "transducer_step", "regulator_step"), "set for resolution=electronics"

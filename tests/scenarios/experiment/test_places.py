@@ -53,8 +53,8 @@ def test_a_place_is_declared_for_each_unit_with_ports_that_its_own_unit_has(scen
         assert not set(place.required) & set(place.optional)
         assert set(place.advised) <= set(place.optional)
         ports = ports_of_place(place, find_unit(scenario.units[name]))
-        assert all(port.sentence for port in ports)
-        clauses = [port.sentence.split("; ") for port in ports]
+        assert all(port.text for port in ports)
+        clauses = [port.text.split("; ") for port in ports]
         assert [named for named in clauses if len(set(named)) < len(named)] == []
 
 
