@@ -106,10 +106,13 @@ def carry(parameters: Any, system: System) -> System:
     return system
 
 
-def with_exposed(places: Mapping[str, Place], parameters: type[Any]) -> Mapping[str, Place]:
-    """Return places whose units may have the parameters that the scenario exposes."""
+def with_exposed(places: Mapping[str, Place], parameters: type[Any], said: str = "") -> Mapping[str, Place]:
+    """Return places whose units may have the parameters that the scenario exposes.
+
+    Of those of another scenario, whose parameters this one does not have, `said` is what there is to know.
+    """
     for own, unit, name in exposed(parameters):
         if unit in places and name not in {**(place := places[unit]).required, **place.optional}:
-            text = _BY_SCENARIO if own == name else f"{_BY_SCENARIO} {own}"
+            text = said or (_BY_SCENARIO if own == name else f"{_BY_SCENARIO} {own}")
             places = {**places, unit: replace(place, optional={**place.optional, name: text})}
     return places

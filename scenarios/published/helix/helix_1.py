@@ -441,6 +441,7 @@ def _table_1(arm: Arm) -> ComparisonTable:
     def timestep(alpha: float) -> str:
         return ", ".join(sorted({f"{r['control_period']:.2f}" for r in arm.rows[alpha]}))
 
+    medians = [format_median(arm.times(alpha), 1) for alpha in ALPHAS]
     every = [f"{PRINTED['runs']} of {PRINTED['runs']}"] * len(ALPHAS)
     return table_of(
         f"Table 1, {arm.title}",
@@ -453,9 +454,14 @@ def _table_1(arm: Arm) -> ComparisonTable:
             row("Gripper began to close", every, lambda a: of((len(arm.times(a)), len(arm.rows[a])))),
             row("Handover succeeded", every, lambda alpha: of(arm.rows[alpha].count)),
         ],
-        "Time until the gripper begins to close, in s; the handover takes another 10 s. In brackets: 95 % interval by "
-        "bootstrap. ±: standard deviation of the runs. Our time step is set, the published one is what computing took.",
+        f"Time until the gripper begins to close, in s; the handover takes another 10 s.{_brackets(medians)} ±: "
+        "standard deviation of the runs. Our time step is set, the published one is what computing took.",
     )
+
+
+def _brackets(medians: Sequence[str]) -> str:
+    """Return a sentence on the intervals of medians; "" where so few runs leave them none."""
+    return " In brackets: 95 % interval by bootstrap." if any("(" in median for median in medians) else ""
 
 
 def _plus_minus(name: str) -> list[str]:
@@ -464,7 +470,8 @@ def _plus_minus(name: str) -> list[str]:
 
 def _steps(arm: Arm) -> ComparisonTable:
     """Return how many control steps the arm takes, which does not depend on the time of a step."""
-    note = "Published: times of table 1 over its mean time steps. In brackets: 95 % interval by bootstrap."
+    medians = [format_median(arm.rows[alpha].metric("steps"), 0) for alpha in ALPHAS]
+    note = f"Published: times of table 1 over its mean time steps.{_brackets(medians)}"
     return table_of(
         f"Control steps, {arm.title}",
         [
@@ -472,10 +479,10 @@ def _steps(arm: Arm) -> ComparisonTable:
                 "α": str(alpha),
                 "published median": str(PRINTED["steps_median"][i]),
                 "published range": "–".join(f"{PRINTED[f'arm_time_{end}'][i] / step:.0f}" for end in ("min", "max")),
-                "our median": format_median(x, 0),
+                "our median": median,
                 "our range": span(x, ".0f", "–"),
             }
-            for i, (alpha, step) in enumerate(_PERIODS.items())
+            for i, ((alpha, step), median) in enumerate(zip(_PERIODS.items(), medians, strict=True))
             for x in [arm.rows[alpha].metric("steps")]
         ],
         note + (_ON_EQUAL_BOUNDS if arm.tuning is Tuning.THESIS else ""),
@@ -494,7 +501,8 @@ def _by_place(arm: Arm) -> ComparisonTable:
         {"place": place.name.lower().replace("_", "-"), **{f"α = {alpha}": at(place, alpha) for alpha in ALPHAS}}
         for place in HandPlace
     ]
-    note = "Time of each run until the gripper begins to close, in s. ✗: the handover did not succeed."
+    note = "Time of each run until the gripper begins to close, in s."
+    note += "" if all(arm.every.succeeded) else " ✗: the handover did not succeed."
     return table_of(f"Times by place, {arm.title}", rows, note)
 
 

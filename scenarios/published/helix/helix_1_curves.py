@@ -515,9 +515,11 @@ def draw_curves(curves: Curves, words: tuple[str, str], bound: float, folder: Pa
         limits = {"ylim": (0, 1500 * bound)}
         estimate.append(Panel(apart, {**axes, "title": "estimate to measured", **limits}))
     of = f"their distances from where it hangs after calibration, and from each other, {title}. {_OVER_RUNS}"
+    ends_drawn = bool(next(iter(curves.values()), ()))
+    of_crosses = " Crosses: the ends of the thesis's curves, by sec. 5.2, at its median time." if ends_drawn else ""
     return [
         *drawn(folder / f"model{suffix}", "Gripper of the commanded state, f(q_sys), and measured one, like figs. 9, "
-               f"18 and 20. Shown are {of} Crosses: the ends of the thesis's curves, by sec. 5.2, at its median time.",
+               f"18 and 20. Shown are {of}{of_crosses}",
                model, size=(8.0, 0.9 + 2.3 * len(model)), legend=2),
         *drawn(folder / f"estimate{suffix}", "Gripper of the estimated state, f(q_est), and measured one, like figs. "
                f"10, 19 and 21. Shown are {of}", estimate, 2, size=(9.0, 0.9 + 1.1 * len(estimate)), legend=3),

@@ -45,7 +45,7 @@ class Helix2(PublishedExperiment):
     """Two guided handovers beside eight unguided ones, at two step sizes, all with the thesis's settings.
 
     The thesis does not say where the hand was in the guided runs; here it is in front. How a person guides is assumed:
-    see `Guidance`. The quick plan is a guided and an unguided run at the smaller step size.
+    see `Guidance`. The quick plan is a guided and an unguided run at step size 0.1.
     """
 
     name: ClassVar[str] = "helix-2"

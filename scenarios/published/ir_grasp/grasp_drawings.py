@@ -204,8 +204,9 @@ def draw_sequences(rows: Sequence[Row], runs: Path, folder: Path) -> Figure | No
                 if n == len(shown) - 1:
                     axes.set_xlabel("x (mm)")
             panels[n * len(columns)].set_ylabel(f"{'perturbed' if row['perturbed'] else 'nominal'}\ny (mm)")
+    poses = " and ".join("perturbed" if row["perturbed"] else "nominal" for row in shown)
     caption = (
-        "Two IR-guided grasps of the baby cup in configuration (a), nominal and perturbed, in moments as in [Luberto] "
+        f"The baby cup in configuration (a) as the IR-guided hand grasps it, {poses}, in moments as in [Luberto] "
         "fig. 11, from above. Beams are solid as far as they meet the object within the range."
     )
     return Figure("sequences", caption)

@@ -387,14 +387,19 @@ def _successes(runs: IrTableRuns, perturbed: bool) -> ComparisonTable:
             found[f"{arm.title}, ours"] = shown(ours) + (" *" if apart else "")
         return found
 
+    rows = [
+        *({"object": title, **cells(thing)} for thing, title in _TITLES.items()),
+        {"object": "total", **cells(None)},
+    ]
+    stars = f" A star: Fisher's exact test rejects equality at {format_share(LEVEL)}, of each cell by itself."
     ours, theirs = runs.count(REFLEX, perturbed), runs.published(REFLEX, perturbed) or (0, 0)
     easier = ours[0] * theirs[1] > theirs[0] * ours[1]
     return table_of(
         f"Table I, {POSES[perturbed]} poses: successful grasps",
-        [*({"object": title, **cells(thing)} for thing, title in _TITLES.items()), {"object": "total", **cells(None)}],
-        "Intervals by Clopper and Pearson, 95 %; all runs of an arm count in the total. A star: Fisher's exact test "
-        f"rejects equality at {format_share(LEVEL)}, of each cell by itself. The forward arms are a control that the "
-        "paper does not have."
+        rows,
+        "Intervals by Clopper and Pearson, 95 %; all runs of an arm count in the total."
+        + (stars if any(text.endswith("*") for row in rows for text in row.values()) else "")
+        + " The forward arms are a control that the paper does not have."
         + (" That our IR-guided hand succeeds more often indicates an easier task." if easier else "")
         + runs.unfinished,
     )

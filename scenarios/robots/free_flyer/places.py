@@ -120,7 +120,7 @@ PLACES_OF_ARM_PUSH = {
             **_ROBOT.optional,
             **_ARM,
             "q_J_0": "the scenario's parameter posture",
-            "friction_J": "the scenario's parameter",
+            "friction_J": "the scenario's parameter friction",
             "f_Q": "a live page cannot push the gripper without it",
             "p_GQ": "",
         },

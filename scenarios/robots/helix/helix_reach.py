@@ -21,8 +21,8 @@ from handover.scenarios.experiment.live_inputs import Pushable
 from handover.scenarios.experiment.places import Place
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import Curve, TimeFigure, TimePlot, phases_of
-from handover.scenarios.robots.helix.helix_handover import HelixHandover
 from handover.scenarios.robots.helix.parameters import CAMERA_PERIOD, PUSHES, Parameters
+from handover.scenarios.robots.helix.places import REACH_PLACES
 
 _KNOWN = 1e-8
 """Variance of an exact measurement, m2; 0 would be of no measurement."""
@@ -91,7 +91,7 @@ class HelixReach(Experiment[ReachEvaluator]):
     title: ClassVar[str] = "how far the Helix reaches, with exact measurements instead of cameras"
     parameters_type: ClassVar[type[ReachParameters]] = ReachParameters
     units: ClassVar[Mapping[str, str]] = {"servo": "VisualServo", "arm": "TendonArm", "hand": "HandoverPartner"}
-    places: ClassVar[Mapping[str, Place]] = {name: HelixHandover.places[name] for name in units}
+    places: ClassVar[Mapping[str, Place]] = REACH_PLACES
     headline: ClassVar[tuple[str, ...]] = ("final_distance", "tilt", "arm_time")
     is_seeded: ClassVar[bool] = False
     parallel_step: ClassVar[Fraction | None] = Fraction(1, 50)

@@ -26,7 +26,7 @@ from handover.scenarios.experiment.time_plot import TimeFigure
 from handover.scenarios.robots.helix.evaluation import HandoverEvaluator, beside_and_along
 from handover.scenarios.robots.helix.helix_handover import HelixHandover
 from handover.scenarios.robots.helix.parameters import Parameters
-from handover.scenarios.robots.helix.places import REFLEX_PLACES
+from handover.scenarios.robots.helix.places import AS_IN_HANDOVER, REFLEX_PLACES
 from handover.scenarios.robots.helix.reflex_grasp_parameters import Offer, ReflexGraspParameters
 
 
@@ -96,7 +96,9 @@ class HelixReflexGrasp(HelixHandover):
         "fingers": "FingerInfrared",
         "reflex": "GraspReflex",
     }
-    places: ClassVar[Mapping[str, Place]] = with_exposed(REFLEX_PLACES, Parameters)
+    places: ClassVar[Mapping[str, Place]] = with_exposed(
+        with_exposed(REFLEX_PLACES, ReflexGraspParameters), Parameters, AS_IN_HANDOVER
+    )
     headline: ClassVar[tuple[str, ...]] = (
         "closing_offset_lateral",
         "closing_offset_axial",

@@ -271,7 +271,7 @@ class UseCaseParameters(BowlPlace, Parameters):
 
 
 _BOWL = {
-    "p_WD": "in W; the scenario's bowl",
+    "p_WD": "the scenario's bowl",
     "bowl_radius": "the scenario's",
     "bowl_depth": "the scenario's",
 }
@@ -279,7 +279,7 @@ _OPTIONAL = {
     "camera": _BOWL,
     "servo": {
         "delivers": "true: after the handover it carries the ball on",
-        "p_WG_drop": "in W; above the bowl's middle, by the scenario's drop_height",
+        "p_WG_drop": "above the bowl's middle, by the scenario's drop_height",
         "threshold_drop": "by the scenario's tuning",
     },
     "hand": {**_BOWL, "bowl_radius": "the scenario's; without a bowl the ball falls through where it stands"},

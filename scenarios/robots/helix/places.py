@@ -31,12 +31,27 @@ _COVARIANCES = {
 
 _TUNED = dict.fromkeys(
     (
+        *("threshold_grasp", "epsilon_pose_bound", "epsilon_control", "A_pose_upd", "settle_steps"),
         *("judge_apart", "windup", "follow_until", "lost_after", "use_covariance", "filter_pictures", "predict_motion"),
         *("shaping_time", "least_response", "posture", "standoff", "threshold_accept"),
         *("K_initialize", "gate", "Q_ball", "Q_wrist", "Q_direction"),
     ),
     "by the scenario's tuning",
 )
+
+_COVERS = dict.fromkeys(
+    (
+        *("cover_left_from", "cover_left_until", "cover_right_from", "cover_right_until"),
+        *("hide_ball_from", "hide_ball_until"),
+    ),
+    "the scenario's disturbances",
+)
+_STIFFNESS = {
+    "EA": "by the scenario's arm_stiffness",
+    "EI": "by the scenario's arm_stiffness",
+    "gripper_mass": "by the scenario's gripper_load",
+}
+_MOVES = {"p_WO_1": "", "move_for": "0 where the hand stays"}
 
 PLACES = {
     "camera": Place(
@@ -54,13 +69,7 @@ PLACES = {
             **_CALIBRATION,
             "seed": "follows from the run's seed",
             "decimation": "the unit is stepped so often",
-            **dict.fromkeys(
-                (
-                    *("cover_left_from", "cover_left_until", "cover_right_from", "cover_right_until"),
-                    *("hide_ball_from", "hide_ball_until"),
-                ),
-                "the scenario's disturbances",
-            ),
+            **_COVERS,
         },
         remarks=(_BASE, "In a camera's frame C, z is its direction of view, x points to the right and y down."),
     ),
@@ -96,11 +105,6 @@ PLACES = {
             "p_WR_est": "shown in pictures",
             "p_WG_est": "shown in plots, pictures and replay",
             "control_period": "the unit is stepped so often; by it, control steps are counted",
-            "threshold_grasp": "by the scenario's tuning",
-            "epsilon_pose_bound": "by the scenario's tuning",
-            "epsilon_control": "by the scenario's tuning",
-            "A_pose_upd": "by the scenario's tuning",
-            "settle_steps": "by the scenario's tuning",
             "adaptive_step": "the scenario's step_rule",
             "seed": "follows from the run's seed",
             **_TUNED,
@@ -131,9 +135,7 @@ PLACES = {
             "f_G": "by it a person guides the gripper",
             "f_P": "a live page cannot push without it",
             "tension": "shown over time",
-            "EA": "by the scenario's arm_stiffness",
-            "EI": "by the scenario's arm_stiffness",
-            "gripper_mass": "by the scenario's gripper_load",
+            **_STIFFNESS,
         },
         remarks=(_BASE,),
     ),
@@ -142,23 +144,51 @@ PLACES = {
             "p_WO": "",
             "p_WH": "",
             "holder": "it is a success if GRIPPER has the ball at the end",
-            "p_WO_0": "follows from the scenario's place, radius and height",
+            "p_WO_0": "where the scenario offers the ball",
         },
         optional={
             "f_G": "",
-            "f_H": "by it the scenario's hand_force_max is judged",
+            "f_H": "by it the run says how hard the hand was pressed",
             "p_WG": "",
             "q_WG": "",
             "grip": "",
             "seed": "follows from the run's seed",
-            "p_WO_1": "",
-            "room": "0 in helix_reach, whose hand does not wait",
-            "move_for": "0 where the hand stays; else the scenario's parameter",
+            **_MOVES,
         },
         remarks=(_BASE,),
     ),
 }
 """By the units' names in the system."""
+
+
+def _without(place: Place, *names: str) -> Place:
+    """Return a place without some optional ports and parameters."""
+    return replace(place, optional={name: text for name, text in place.optional.items() if name not in names})
+
+
+REACH_PLACES = {
+    "servo": replace(
+        PLACES["servo"],
+        optional={
+            **_without(PLACES["servo"], *_TUNED, "q_sys", "adaptive_step", "control_period", "seed").optional,
+            "threshold_accept": "0: near is not there",
+        },
+    ),
+    "arm": _without(PLACES["arm"], *_STIFFNESS),
+    "hand": replace(
+        PLACES["hand"],
+        optional={
+            **_without(PLACES["hand"], *_MOVES, "seed").optional,
+            "room": "0: the hand does not wait",
+            "tremor_rms": "0",
+            "drift_rms": "0",
+        },
+    ),
+}
+"""By the units' names where no camera looks and the hand is still."""
+
+AS_IN_HANDOVER = "as helix_handover has it by default"
+"""Of parameters that `helix_handover` has and a scenario that is made of it has not."""
 
 _FINGERS = {
     "p_WG": "",
@@ -180,9 +210,17 @@ _NEAR = {
     "hide_ball_within": "the scenario's near, with cameras=ball_hidden",
 }
 
+
+def _as_in_handover(name: str) -> Place:
+    place, names = PLACES[name], {*_TUNED, *_COVERS, *_STIFFNESS, "adaptive_step"}
+    given = {n: AS_IN_HANDOVER if n in names else text for n, text in place.optional.items()}
+    return replace(place, optional=given)
+
+
 REFLEX_PLACES = {
     **PLACES,
-    "camera": replace(PLACES["camera"], optional={**PLACES["camera"].optional, **_NEAR}),
+    **{name: _as_in_handover(name) for name in ("servo", "arm")},
+    "camera": replace(_as_in_handover("camera"), optional={**_as_in_handover("camera").optional, **_NEAR}),
     "fingers": Place(
         required={
             "ticks": "of 12-bit converters. Those that look across look to the gripper's axis. The fingers are at 60, "

@@ -81,8 +81,13 @@ class VslPickAndPlace(Experiment[PickAndPlaceEvaluator]):
         ),
         "arm": Place(
             required={**PLACES["arm"].required, "f_G": "by it touches are judged", "load": "what the gripper holds"},
-            optional={n: PLACES["arm"].optional[n] for n in ("p_cmd", "q_0", "seed")}
-            | {"motion": "it swings", "face": "where the object's top is", "substep": "as contacts need"},
+            optional={n: PLACES["arm"].optional[n] for n in ("p_cmd", "seed")}
+            | {
+                "q_0": "above the place where it picks the object up",
+                "motion": "it swings",
+                "face": "where the object's top is",
+                "substep": "as contacts need",
+            },
             remarks=PLACES["arm"].remarks,
         ),
         "gripper": Place(

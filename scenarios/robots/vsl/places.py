@@ -57,7 +57,9 @@ PLACES = {
         optional={
             "p_cmd": "",
             "tilt_meas": "wired where there are IMUs",
-            **dict.fromkeys(("link_2", "link_3", "load", "q_0"), "the scenario's parameter"),
+            **dict.fromkeys(("link_2", "link_3"), "by the scenario's parameter links"),
+            "load": "the scenario's parameter",
+            "q_0": "the tip is 0.3 m from the base, level with the shoulder",
             **dict.fromkeys(
                 ("base_step", "encoder_step", "transducer_step", "regulator_step"), "set for resolution=electronics"
             ),

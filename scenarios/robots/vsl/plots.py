@@ -198,7 +198,9 @@ def _errors(evaluator: PathEvaluator, folder: Path) -> Figure:
         "tip by tracker,\nto desired": [p.error for p in evaluator.points],
         "tip by servos,\nto true tip": [distance(p.servo, p.true) for p in evaluator.points],
     }
+    by = "by the tracker"
     if evaluator.hybrid:
+        by += ", or by the hybrid model"
         groups["hybrid model,\nto true tip"] = [distance(p.estimated, p.true) for p in evaluator.points]
     colours = (SERVO_COLOUR, TIP_COLOUR, COLOURS[4], ESTIMATE_COLOUR)
     with figure(folder / "errors", 1, 2, size=(9.0, 3.8)) as (boxes, reach):
@@ -211,9 +213,9 @@ def _errors(evaluator: PathEvaluator, folder: Path) -> Figure:
         reach.plot(where, [p.error * 1000 for p in evaluator.points], ".", color=TIP_COLOUR)
         reach.set(xlabel=label, ylabel="error of the tip (mm)", ylim=(0.0, None))
     caption = (
-        "Left: distances to the desired points or to the true tip, by the servos' encoders and rigid links, by the "
-        "tracker, or by the hybrid model. Boxes: 25th to 75th percentile; lines: median and range; dots: mean. Right: "
-        "error of the tip over the desired point's place."
+        f"Left: distances to the desired points or to the true tip, by the servos' encoders and rigid links, {by}. "
+        "Boxes: 25th to 75th percentile; lines: median and range; dots: mean. Right: error of the tip over the desired "
+        "point's place."
     )
     return Figure("errors", caption)
 
