@@ -54,6 +54,7 @@ NotebookClient.__init__ = partialmethod(NotebookClient.__init__, coalesce_stream
 
 html_math_renderer = "mathml"
 html_theme = "furo"
+templates_path = ["templates"]  # of which Sphinx reads search.html alone
 html_title = f"handover-cosim {release}"
 html_static_path = ["static"]
 html_css_files = ["site.css"]
@@ -107,6 +108,12 @@ def keep_together(app: Sphinx, doctree: nodes.document, page: str) -> None:  # n
             text.parent.replace(text, nodes.Text(kept))
 
 
+def put_progress_first(app: Sphinx, doctree: nodes.document, page: str) -> None:  # noqa: ARG001
+    """Show what a cell's commands say while they run above what they print: MyST-NB has streams, and not their order."""
+    for output in doctree.findall(lambda node: isinstance(node, nodes.container) and "cell_output" in node["classes"]):
+        output[:] = sorted(output, key=lambda node: "stderr" not in node.get("classes", ()))
+
+
 def make_cache(app: Sphinx) -> None:
     """Make the cache of executed tutorials, which two processes that read pages would make at once, and fail."""
     get_cache(app.config.nb_execution_cache_path).db  # noqa: B018
@@ -154,6 +161,7 @@ def setup(app: Sphinx) -> None:
     app.connect("builder-inited", make_cache)
     app.connect("env-before-read-docs", mix_pages)
     app.connect("doctree-resolved", keep_together)
+    app.connect("doctree-resolved", put_progress_first)
     app.connect("sphinx-click-process-description", set_columns)
     app.connect("sphinx-click-process-options", set_defaults)
     app.connect("autodoc-process-docstring", set_code)

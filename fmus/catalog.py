@@ -83,7 +83,7 @@ _ENTRIES = (
         "StereoCamera",
         "handover.plants.helix.cameras.stereo_camera:StereoCamera",
         Fraction(1, 30),
-        "pictures of two cameras",
+        "pictures of two cameras, or three",
     ),
     Entry(
         "FingerInfrared",

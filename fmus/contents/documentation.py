@@ -130,7 +130,7 @@ def _start(v: Variable) -> str:
     if v.shape:
         rows = np.atleast_2d(v.start)
         if rows.size > 9:
-            return f"{rows.flat[0]:.6g} …"
+            return f"all {rows.flat[0]:.6g}" if np.all(rows == rows.flat[0]) else f"{rows.size} values"
         if len(rows) > 1 and rows.shape[0] == rows.shape[1] and np.array_equal(rows, np.diag(np.diag(rows))):
             return f"diag({', '.join(f'{value:.6g}' for value in np.diag(rows))})"
         return "; ".join(", ".join(f"{value:.6g}" for value in row) for row in rows)

@@ -27,9 +27,9 @@ _HELP = """Run a paper's EXPERIMENT, and compare its results with the published 
 
 Without EXPERIMENT, list them.
 
-Each claim of the paper gets a verdict, reproduced, not reproduced or not comparable, with the rule behind it. Rules
-were laid down before the runs. Intervals are at 95 %: Clopper and Pearson's for rates, bootstrapped for times and
-distances.
+Each claim of the paper gets a verdict, reproduced, not reproduced or not comparable, with the rule behind it. What is
+claimed here beyond the paper holds, does not hold, or has too few runs. Rules were laid down before the runs. Intervals
+are at 95 %: Clopper and Pearson's for rates, bootstrapped for times and distances.
 
 The folder is that of a campaign, as of `handover sweep`, with claims.json, and figures for papers in figures/. However
 it was ended, run the same command again to resume; nothing that is done is repeated.

@@ -113,7 +113,7 @@ class Params(CamerasAndMarkers):
     )
     decimation: int = parameter(
         1,
-        "how many of the 30 pairs of pictures a second there are to one that is looked at",
+        "use every n-th of the 30 pairs of pictures a second",
         minimum=1,
         maximum=300,
         origin=assumed("every picture is taken; scenarios set it"),

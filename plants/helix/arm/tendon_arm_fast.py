@@ -1,4 +1,4 @@
-"""The arm of `TendonArm` by kernels of its own, several times as fast: for campaigns, sweeps and learning."""
+"""The arm of `TendonArm` by kernels of its own, some ten times as fast: for campaigns, sweeps and learning."""
 
 from collections.abc import Mapping
 from fractions import Fraction

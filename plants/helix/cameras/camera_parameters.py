@@ -83,7 +83,7 @@ class Params(CamerasAndMarkers, BowlParameters):
     )
     decimation: int = parameter(
         1,
-        "how many of the 30 pictures a second there are to one that is taken",
+        "take every n-th of the 30 pictures a second",
         minimum=1,
         maximum=300,
         origin=assumed("every picture is taken; scenarios set it"),

@@ -78,7 +78,7 @@ machine.
 \b
 Environment, when units are built
   HANDOVER_FMI_PLATFORMS  platforms for which the package, and what is missing
-                          of it, is compiled [default: host]
+                          of it, is compiled without --platform [default: host]
   HANDOVER_CACHE          folder for what is compiled where the package cannot be
                           written
 
@@ -120,7 +120,7 @@ Environment, when a tool loads the units
     multiple=True,
     metavar="NAME[,NAME]...",
     help="Platforms to run on: " + ", ".join(TARGETS) + ", `host` or `all`; missing ones are compiled, which takes a "
-    "minute the first time  [default: all that are compiled]",
+    "minute the first time  [default: those of HANDOVER_FMI_PLATFORMS, and all others that are compiled]",
 )
 @click.option(
     "--standalone",

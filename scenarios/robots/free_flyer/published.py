@@ -40,7 +40,7 @@ def published_of_giving(p: HandoverParameters) -> Sequence[PublishedValue]:
             paper=_PAPER,
             name="transfer_displacement_z",
             index=(int(p.behaviour),),
-            note="of one run; how strongly the person pulled is not stated",
+            note=f"of one run of the {p.behaviour.item} robot; how strongly the person pulled is not stated",
         ),
         _threshold(p, "velocity_hand"),
         PublishedValue(
@@ -64,7 +64,7 @@ def _threshold(p: HandoverParameters, name: str) -> PublishedValue:
         name=name,
         index=(int(p.behaviour),),
         relation="above",
-        note="the robot's threshold, which is the thesis's here too",
+        note=f"the {p.behaviour.item} robot's threshold, which is the thesis's here too",
     )
 
 
