@@ -109,7 +109,7 @@ def keep_together(app: Sphinx, doctree: nodes.document, page: str) -> None:  # n
 
 
 def put_progress_first(app: Sphinx, doctree: nodes.document, page: str) -> None:  # noqa: ARG001
-    """Show what a cell's commands say while they run above what they print: MyST-NB has streams, and not their order."""
+    """Show what a cell's commands say while they run above what they print: MyST-NB drops their order."""
     for output in doctree.findall(lambda node: isinstance(node, nodes.container) and "cell_output" in node["classes"]):
         output[:] = sorted(output, key=lambda node: "stderr" not in node.get("classes", ()))
 
