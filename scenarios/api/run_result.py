@@ -2,7 +2,6 @@
 
 import functools
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -79,13 +78,12 @@ class Run:
             experiment: its scenario, where that has no name by which it is found.
 
         Raises:
-            InvalidInput: it is not the folder of a run, or a file in it is damaged.
+            InvalidInput: it is not the folder of a run, or not of one of this scenario, or a file in it is damaged.
         """
         self.folder = path_of("folder", folder)
         self._place = RunFolder.of_run(self.folder)
         with errors_for_python():
-            facts = RunFacts.read(self._place)
-            self._facts = facts if experiment is None else replace(facts, experiment=experiment)
+            self._facts = RunFacts.read(self._place, experiment)
             if not (self._facts.ended and self._place.signals.exists()):
                 with self._place.held():
                     complete_signals(self._place)
@@ -185,8 +183,8 @@ class Run:
         """Write the report page into the folder, and with `figures` the figures as PNG and SVG; return the page.
 
         Raises:
-            InvalidInput: a file of the folder is damaged, or the extra `reports` is not installed. RecordNotWritten:
-                the disk is full.
+            InvalidInput: a file of the folder is damaged, or the extra `reports` is not installed.
+            RecordNotWritten: the disk is full.
         """
         with errors_for_python():
             require_extra("reports", "reports")
@@ -195,8 +193,8 @@ class Run:
 
         with errors_for_python(), self._place.held():
             if figures:
-                draw_run(self._place)
-            write_run_page(self._place)
+                draw_run(self._place, self._facts.experiment)
+            write_run_page(self._place, experiment=self._facts.experiment)
         path = self.folder / self._place.report.name
         return Page(path.read_text(encoding="utf-8"), path)
 

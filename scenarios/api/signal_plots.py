@@ -4,16 +4,13 @@ import io
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from handover.cosim.exceptions import nearest
 from handover.scenarios.api.signals import SignalTable
-from handover.scenarios.experiment.display_unit import unit_symbol
 from handover.scenarios.experiment.plotting import draw_time_plot, own_style
-from handover.scenarios.experiment.time_plot import COLOURS, Curve, TimePlot
-from handover.scenarios.runs.results.run_facts import elements_of
+from handover.scenarios.runs.reporting.run_figures import signal_plot
 
 _WIDTH, _ALONE, _STACKED = 8.0, 3.0, 2.1
 """Width of a figure, height of a single plot, and of each of several below each other, in."""
@@ -64,13 +61,9 @@ def plot_signals(signals: SignalTable, names: Sequence[str], axes: Axes | None =
 
 
 def _draw(axes: Axes, signals: SignalTable, name: str) -> None:
-    values, items = signals[name], signals.item_names(name)
-    elements = list(elements_of(name.rpartition(".")[2], values).items())[: len(COLOURS)]
-    held = values.dtype.kind != "f"
-    curves = [Curve(label=label, values=column.astype(np.float64), held=held) for label, column in elements]
-    plot = TimePlot(title=name, quantity=name, unit=unit_symbol(signals.unit(name)), curves=curves)
+    items, plot = signals.item_names(name), signal_plot(name, name, signals[name], signals.unit(name))
     draw_time_plot(axes, plot, signals.time)
     if items:
         axes.set_yticks(list(items), [text.replace("_", " ").lower() for text in items.values()])
-    if len(curves) > 1:
+    if len(plot.curves) > 1:
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))

@@ -20,12 +20,13 @@ from handover.scenarios.experiment.experiment import Evaluator, Experiment, Metr
 from handover.scenarios.experiment.live_inputs import let_push
 from handover.scenarios.runs.execution.errors import UsageError
 from handover.scenarios.runs.execution.exit_status import status_of_run
+from handover.scenarios.runs.execution.file_experiment import FileExperiment
 from handover.scenarios.runs.execution.input_sources import give_inputs
 from handover.scenarios.runs.execution.interruption import Interruption
 from handover.scenarios.runs.execution.resumption import Resumption, pack
 from handover.scenarios.runs.execution.supervisor import heartbeat_of_run, is_supervised
 from handover.scenarios.runs.execution.unit_values import built_system, settings_behind
-from handover.scenarios.runs.results.not_finite import NotFiniteData, outputs_not_finite
+from handover.scenarios.runs.results.output_faults import NotFiniteData, outputs_not_finite, outputs_out_of_range
 from handover.scenarios.runs.results.pictures import write_picture_files
 from handover.scenarios.runs.results.run_facts import record_of
 from handover.scenarios.runs.results.run_folder import disk_errors_reported
@@ -118,7 +119,7 @@ def run_task(
         master.pacer = ControlledPacer(control)
     if resumption is None:
         master.heartbeat.record_scratch_folder(str(task.folder.path))  # if it crashes before the folder is begun
-    began, not_finite, recorded = False, list[NotFiniteData](), dict[str, Metric]()
+    began, not_finite, out_of_range, recorded = False, list[NotFiniteData](), list[str](), dict[str, Metric]()
     try:
         with master:
             if resumption is not None:
@@ -130,6 +131,7 @@ def run_task(
             failure = _run(task, master, evaluator, resumption, around)
             with disk_errors_reported(task.folder.signals):  # before units end: one may hang as its library is unloaded
                 not_finite = outputs_not_finite(task.folder.signals, master.system)
+                out_of_range = outputs_out_of_range(task.folder.signals, master.system)
                 recorded = experiment.recorded_metrics(task.folder.signals)
     except InitializationError as e:
         with scenario_code(experiment):
@@ -139,7 +141,7 @@ def run_task(
         if not began:
             raise
         failure = failure or e
-    ended = _Ended(failure, interruption.asked, not_finite, recorded, clock())
+    ended = _Ended(failure, interruption.asked, not_finite, out_of_range, recorded, clock())
     return _conclude(task, master, evaluator, ended, concluded)
 
 
@@ -231,6 +233,7 @@ class _Ended:
     failure: UnitFailure | None
     interrupted: bool
     not_finite: Sequence[NotFiniteData]
+    out_of_range: Sequence[str]
     recorded: Mapping[str, Metric]
     spent: ElapsedTime
 
@@ -243,7 +246,8 @@ def _conclude(
     outcome = _outcome(task, evaluator, failure, interrupted, master)
     outcome = replace(outcome, metrics={**outcome.metrics, **ended.recorded})
     complete = failure is None and (evaluator.over or not interrupted)
-    summary = finished_summary(task, outcome, master, ended.spent, failure, complete, ended.not_finite)
+    found = ended.not_finite, ended.out_of_range
+    summary = finished_summary(task, outcome, master, ended.spent, failure, complete, *found)
     task.folder.write_summary(summary)
     status = status_of_run(unit_failed=failure is not None, succeeded=outcome.success)
     master.heartbeat.record_facts(concluded=status)  # whatever crashes from here on, this is how it ended
@@ -295,4 +299,5 @@ def _present(
     if faults.lines:
         task.folder.write_summary({**summary, "left_out": faults.lines})
     with faults.tolerated("the report could not be written"):
-        faults.lines += write_run_page(task.folder)
+        own = None if isinstance(task.experiment, FileExperiment) else task.experiment
+        faults.lines += write_run_page(task.folder, experiment=own)

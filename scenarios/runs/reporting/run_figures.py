@@ -10,6 +10,9 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from handover.cosim.record.reader import Record, RecordedSignals
 from handover.scenarios.experiment.display_unit import unit_symbol
 from handover.scenarios.experiment.experiment import Evaluator, Experiment, Figure
@@ -18,7 +21,7 @@ from handover.scenarios.experiment.plotting import draw_time_figures
 from handover.scenarios.experiment.time_plot import COLOURS, Curve, TimeFigure, TimePlot
 from handover.scenarios.runs.results.lacking_record import LackingRecord
 from handover.scenarios.runs.results.pictures import read_picture_files
-from handover.scenarios.runs.results.run_facts import RunFacts, record_of
+from handover.scenarios.runs.results.run_facts import RunFacts, elements_of, record_of
 from handover.scenarios.runs.results.run_folder import InvalidRunFolder, RunFolder, disk_errors_reported, folder_within
 from handover.scenarios.runs.results.tolerated_faults import ToleratedFaults, drawing
 
@@ -49,14 +52,16 @@ def draw_figures(
 
 
 @drawing
-def draw_run(folder: RunFolder) -> list[str]:
+def draw_run(folder: RunFolder, experiment: Experiment[Any] | None = None) -> list[str]:
     """Draw a run's figures into `figures/`, replacing those of the same names; return what failed, a line each.
+
+    `experiment` is its scenario, where that has no name by which it is found.
 
     Raises:
         InvalidRunFolder: it is not the folder of a run, it is damaged, or it has nothing to draw.
         RecordNotWritten: they cannot be written.
     """
-    facts, record = RunFacts.read(folder), record_of(folder)
+    facts, record = RunFacts.read(folder, experiment), record_of(folder)
     if record is None:
         why = facts.missing_record or "its record has less than two rows"
         raise InvalidRunFolder(folder.path, f"there is nothing to draw: {why}")
@@ -113,13 +118,22 @@ def figures_of_outputs(units: Iterable[str], record: Record) -> list[TimeFigure]
         ports = [s for s in record.signals if s.startswith(f"{name}.") and record[s].dtype.kind == "f"][:_MAX_SIGNALS]
         if ports:
             file = f"{len(figures) + 1}_{re.sub(r'[^A-Za-z0-9_-]', '_', name)}"
-            plots = [_output(port, port.removeprefix(f"{name}."), record) for port in ports]
+            plots = [signal_plot(p, p.removeprefix(f"{name}."), record[p], record.unit(p)) for p in ports]
             figures.append(TimeFigure(name=file, caption=f"Outputs of {name} over time.", plots=plots))
     return figures
 
 
-def _output(port: str, quantity: str, record: Record) -> TimePlot:
-    values = record[port].reshape(len(record.time), -1)[:, : len(COLOURS)]
-    labels = [quantity] if values.shape[1] == 1 else [f"element {k + 1}" for k in range(values.shape[1])]
-    curves = [Curve(label=label, values=values[:, k]) for k, label in enumerate(labels)]
-    return TimePlot(title=port, quantity=quantity, unit=unit_symbol(record.unit(port)), curves=curves)
+def signal_plot(name: str, quantity: str, values: NDArray[Any], unit: str) -> TimePlot:
+    """Return a plot of a signal over time; of one with many elements the first ones, as its axis says.
+
+    Args:
+        name: of the signal, the title.
+        quantity: what stands at the axis, and in the legend of several elements, `p_WG[1]`.
+        values: with a row a time.
+        unit: the signal's, as a record has it.
+    """
+    elements, held = elements_of(quantity, values), values.dtype.kind != "f"
+    shown = list(elements.items())[: len(COLOURS)]
+    curves = [Curve(label=label, values=column.astype(np.float64), held=held) for label, column in shown]
+    some = "" if len(shown) == len(elements) else f", first {len(shown)} of {len(elements)}"
+    return TimePlot(title=name, quantity=f"{quantity}{some}", unit=unit_symbol(unit), curves=curves)

@@ -18,6 +18,7 @@ import plotly.graph_objects as go
 from markupsafe import Markup
 
 from handover.cosim.record.reader import Record
+from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.paper import PublishedValue
 from handover.scenarios.experiment.parameters import InvalidParameter, parameters_of
 from handover.scenarios.experiment.pictures import CameraPicture, Mark
@@ -190,18 +191,22 @@ def _mark_style(mark: Mark, picture: CameraPicture) -> str:
 
 
 @drawing
-def write_run_page(folder: RunFolder, file: Path | None = None) -> list[str]:
+def write_run_page(
+    folder: RunFolder, file: Path | None = None, experiment: Experiment[Any] | None = None
+) -> list[str]:  # fmt: skip
     """Write the page of a run, with all that its folder has of it; return what could not be shown, a line each.
 
     Args:
         folder: the run's.
         file: where the page goes; by default `report.html` in the folder.
+        experiment: its scenario, where that has no name by which it is found.
 
     Raises:
-        InvalidRunFolder: it is not the folder of a run, or it is damaged; nothing is written.
+        InvalidRunFolder: it is not the folder of a run, or not of one of the scenario, or it is damaged; nothing is
+            written.
         RecordNotWritten: the page cannot be written.
     """
-    facts = RunFacts.read(folder)
+    facts = RunFacts.read(folder, experiment)
     record, faults = record_of(folder), ToleratedFaults()
     faults.lines += filter(None, [facts.missing_record])
     replay, plots = _sections_of_scenario(facts, record, faults)

@@ -37,18 +37,25 @@ class RunFacts:
     ended: bool
 
     @classmethod
-    def read(cls, folder: RunFolder) -> "RunFacts":
+    def read(cls, folder: RunFolder, experiment: Experiment[Any] | None = None) -> "RunFacts":
         """Read and check both files.
 
+        Args:
+            folder: the run's.
+            experiment: its scenario, where that has no name by which it is found.
+
         Raises:
-            InvalidRunFolder: it is not the folder of a run, or one of the files is damaged.
+            InvalidRunFolder: it is not the folder of a run, or not of one of the scenario, or a file is damaged.
         """
         run, summary = folder.read_run(), folder.read_summary()
         ended = bool(summary)
         if not ended:
             summary = unwritten_summary(run)
-        scenario = scenario_of(run["scenario"], run.get("source", {}))
-        experiment = None if scenario is None else scenario()
+        if experiment is None:
+            scenario = scenario_of(run["scenario"], run.get("source", {}))
+            experiment = None if scenario is None else scenario()
+        elif experiment.name != run["scenario"]:
+            raise InvalidRunFolder(folder.path, f"it is a run of {run['scenario']}, not of {experiment.name}")
         return cls(folder=folder, run=run, summary=summary, experiment=experiment, ended=ended)
 
     @property

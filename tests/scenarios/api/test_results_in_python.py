@@ -64,7 +64,7 @@ def test_plots_have_names_and_units_at_their_axes(run: handover.Run):
     assert above.get_ylabel() == "scene.p_WH (m)"
     assert below.get_ylabel() == "reflex.phase"
     assert below.get_xlabel() == "time (s)"
-    assert [line.get_label() for line in above.get_lines()] == ["p_WH[1]", "p_WH[2]"]
+    assert [line.get_label() for line in above.get_lines()] == ["scene.p_WH[1]", "scene.p_WH[2]"]
     assert np.array_equal(np.asarray(above.get_lines()[1].get_ydata()), run.signals["scene.p_WH"][:, 1])
     assert "reach" in [label.get_text() for label in below.get_yticklabels()]
     assert figure._repr_png_().startswith(b"\x89PNG")  # type: ignore

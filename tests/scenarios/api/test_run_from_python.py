@@ -81,6 +81,14 @@ def test_a_class_of_ones_own_is_run_and_drawn(tmp_path: Path):
     run = handover.run(Nearer, strategy="blind", standoff=0.05, stop=0.5, out=tmp_path / "n")
     assert run.scenario == "nearer"
     assert 'class="replay"' in run.replay().html
+    with pytest.raises(handover.InvalidInput, match="it is a run of nearer, not of ir_grasp"):
+        handover.Run(run.folder, IrGrasp())
+    Nearer.name = "moved"  # as that of a notebook, it is found by no name then
+    try:
+        again = type("Nearer", (Nearer,), {"name": "nearer", "title": ""})()
+        assert 'class="replay"' in handover.Run(run.folder, again).report().html
+    finally:
+        Nearer.name = "nearer"
     with handover.open(Nearer, strategy="blind") as s:
         assert "scene.p_WH" in s.outputs
 

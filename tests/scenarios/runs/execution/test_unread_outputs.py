@@ -1,5 +1,6 @@
 """Outputs that feed nothing and are NaN or infinite: the run goes on, and its end tells them."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +11,15 @@ from support.commands import call, data_in
 from support.cosim.native_units import native_fmu
 
 import handover
+from handover.cosim.fmu.file.description import describe_fmu
 from handover.cosim.record.reader import Record
 from handover.cosim.system.system import System
-from handover.scenarios.runs.results.not_finite import MAX_LINES, not_finite_lines, outputs_not_finite
+from handover.scenarios.runs.results.output_faults import (
+    MAX_LINES,
+    not_finite_lines,
+    outputs_not_finite,
+    outputs_out_of_range,
+)
 
 NAN_LINE = "unit gives_nan: y = NaN at t = 0.3 s, which no unit reads"
 
@@ -49,6 +56,20 @@ def test_a_run_with_finite_outputs_tells_nothing(tmp_path: Path):
     assert result.exit_code == 0, result.output
     assert "no unit reads" not in result.output
     assert "not_finite" not in data_in(tmp_path / "r")
+
+
+def test_outputs_beyond_their_range_are_named_with_the_first_time(tmp_path: Path):
+    d, wired = describe_fmu(native_fmu("gain", 3)), System()
+    limited = {f"y{n}": replace(d.outputs["y"], name=f"y{n}", minimum=0.0, maximum=1.0) for n in range(MAX_LINES + 3)}
+    wired.add("a", replace(d, outputs=limited))
+    columns = {f"a.{name}": [0.0, 1.0 + 1e-12, 1.5, -2.0] for name in limited}
+    file = tmp_path / "signals.parquet"
+    lines = outputs_out_of_range(record(file, **{"time": [0.0, 0.1, 0.2, 0.3], **columns}), wired)
+    assert lines[0] == "a.y0 = 1.5 at t = 0.2 s, beyond its range, from 0 to 1"
+    assert lines[MAX_LINES:] == ["3 more outputs go beyond the declared range"]
+    columns = {f"a.{name}": [-1e-12, 0.5] for name in limited}
+    assert len(outputs_out_of_range(record(file, time=[0.0, 0.1], **columns), wired)) == MAX_LINES + 1
+    assert outputs_out_of_range(record(file, time=[0.0], **{"a.y0": [1.0]}), wired) == []
 
 
 def record(file: Path, **columns: list[float]) -> Path:

@@ -69,7 +69,17 @@ def test_the_report_says_how_units_were_coupled(tmp_path: Path):
     file, out = failing_ssp(tmp_path, "gain"), tmp_path / "out"
     run(file, out, "--adaptive", "1e-3", "--pace", "1000", "--extrapolation", "linear", "--no-report")
     page, summary = Page(RunFolder.of_run(out)), json.loads((out / "summary.json").read_text())
-    absent = {"ended", "inputs", "left_out", "not_finite", "recorded", "stop", "unit_values", "warnings"}
+    absent = {
+        "ended",
+        "inputs",
+        "left_out",
+        "not_finite",
+        "out_of_range",
+        "recorded",
+        "stop",
+        "unit_values",
+        "warnings",
+    }
     assert set(summary) == set(Summary.__annotations__) - absent
     rows = dict(row for row in page.rows if len(row) == 2)
     assert rows["algorithm"] == "gauss-seidel"

@@ -1,21 +1,27 @@
-"""Outputs of a run that are NaN or infinite in its record: which, from when on, and the lines that tell of them.
+"""Outputs of a run that are NaN, infinite or out of their range in its record: which, from when on, and lines on them.
 
 The master checks what feeds a unit, and a value that is not finite there ends the run. What feeds no unit harms none of
-them: the run goes on, and they are reported at its end.
+them: the run goes on, and they are reported at its end. So are outputs beyond the range that their FMU declares.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypedDict
 
 import numpy as np
+from numpy.typing import NDArray
 
-from handover.cosim.blocks.variable import SUBSCRIPT
+from handover.cosim.blocks.start_values import range_of
+from handover.cosim.blocks.variable import SUBSCRIPT, Kind, element_names
 from handover.cosim.exceptions import counted
 from handover.cosim.system.system import System
 
 MAX_LINES = 5
 """Outputs that are reported in a line each; of more there is the number."""
+
+
+_ROUNDING = 1e-9
+"""By how much of its limit an output may be beyond it."""
 
 
 class NotFiniteData(TypedDict):
@@ -44,7 +50,7 @@ def outputs_not_finite(signals: Path, system: System) -> list[NotFiniteData]:
         return []
     fed = {(c.source.unit, c.source.port) for c in system.connections}
     found: dict[tuple[str, str], NotFiniteData] = {}
-    for name, row_time, value in _first_not_finite(signals):
+    for name, row_time, value in _first(signals, None, lambda _name, values: ~np.isfinite(values)):
         index = SUBSCRIPT.search(name)
         unit, port = _ends(name if index is None else name[: index.start()], system)
         begun = found.get((unit, port))
@@ -59,6 +65,35 @@ def outputs_not_finite(signals: Path, system: System) -> list[NotFiniteData]:
     return list(found.values())
 
 
+def outputs_out_of_range(signals: Path, system: System) -> list[str]:
+    """Return a line for each entry of an output that left its declared range in the record of a run, with the time.
+
+    Of many there are the first few lines, and one that says how many more there are.
+    """
+    bounded = {
+        f"{unit.name}.{entry}": port
+        for unit in system.units.values()
+        for port in unit.description.outputs.values()
+        if port.kind is Kind.REAL and (port.minimum, port.maximum) != (None, None)
+        for entry in element_names(port)
+    }
+
+    def leaves(name: str, values: NDArray[Any]) -> NDArray[Any]:
+        low, high = bounded[name].minimum, bounded[name].maximum
+        below = low is not None and values < low - _ROUNDING * abs(low)
+        above = high is not None and values > high + _ROUNDING * abs(high)
+        return np.logical_or(below, above)
+
+    found = _first(signals, bounded, leaves) if bounded and signals.exists() else ()
+    lines = [
+        f"{name} = {value:g} at t = {time:.6g} s, beyond its range, {range_of(bounded[name])}"
+        for name, time, value in found
+    ]
+    if (more := len(lines) - MAX_LINES) > 0:
+        lines[MAX_LINES:] = [f"{counted(more, 'more output goes', 'more outputs go')} beyond the declared range"]
+    return lines
+
+
 def _ends(name: str, system: System) -> tuple[str, str]:
     """Return the unit and the port of a signal; names of units may have dots in them, as those of nested systems."""
     units = [unit for unit in system.units if name.startswith(f"{unit}.")]
@@ -66,8 +101,13 @@ def _ends(name: str, system: System) -> tuple[str, str]:
     return unit, name.removeprefix(f"{unit}.")
 
 
-def _first_not_finite(signals: Path) -> Iterator[tuple[str, float, float]]:
-    """Yield each column of real numbers that is not finite somewhere, with the time of the first such value, and it."""
+def _first(
+    signals: Path, names: Collection[str] | None, is_wrong: Callable[[str, NDArray[Any]], NDArray[Any]]
+) -> Iterator[tuple[str, float, float]]:
+    """Yield each column of real numbers that is wrong somewhere, with the time of the first such value, and the value.
+
+    `names` are those that are looked at, None for all.
+    """
     import pyarrow as pa  # slow to import
     import pyarrow.parquet as pq
 
@@ -75,7 +115,11 @@ def _first_not_finite(signals: Path) -> Iterator[tuple[str, float, float]]:
 
     file = pq.ParquetFile(signals)
     schema = file.schema_arrow
-    real = [name for name, kind in zip(schema.names, schema.types, strict=True) if kind == pa.float64()]
+    real = [
+        name
+        for name, kind in zip(schema.names, schema.types, strict=True)
+        if kind == pa.float64() and (names is None or name in names or name == "time")
+    ]
     first: dict[str, tuple[float, float]] = {}
     for batch in file.iter_batches(columns=real, use_threads=False):
         time = column_values(batch.column("time"))
@@ -83,9 +127,9 @@ def _first_not_finite(signals: Path) -> Iterator[tuple[str, float, float]]:
             if name == "time" or name in first:
                 continue
             values = column_values(batch.column(name))
-            finite = np.isfinite(values)
-            if not finite.all():
-                row = int(np.argmin(finite))
+            wrong = is_wrong(name, values)
+            if wrong.any():
+                row = int(np.argmax(wrong))
                 first[name] = float(time[row]), float(values[row])
     yield from ((name, *first[name]) for name in real if name in first)
 
