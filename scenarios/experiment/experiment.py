@@ -25,12 +25,12 @@ from handover.cosim.blocks.variable import Causality, Variable
 from handover.cosim.record.reader import Record
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PlacedUnit, System
-from handover.scenarios.experiment.exposed import carry, check_exposed, with_exposed
+from handover.scenarios.experiment.exposed import carry, check_exposed, notes_without_effect, with_exposed
 from handover.scenarios.experiment.live_inputs import HandHint, LedHand, Pushable
 from handover.scenarios.experiment.needs import needs_of
 from handover.scenarios.experiment.paper import PublishedValue
 from handover.scenarios.experiment.pictures import CameraPicture
-from handover.scenarios.experiment.places import Place, fit_places, presume_steps_of_places
+from handover.scenarios.experiment.places import Place, fit_places, presume_steps_of_places, sample_in_places
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.returned_types import (
     FILES,
@@ -269,8 +269,10 @@ class Experiment(abc.ABC, Generic[AnyEvaluator]):
         """
         system = self.build(parameters, seed, fmu)
         presume_steps_of_places(system, self.units)
+        sample_in_places(system, self.units)
         path = f"{type(self).__module__}:{type(self).__qualname__}"
         fit_places(system, self.places, self.units, self.name if path.startswith("handover.") else path)
+        system.notes += notes_without_effect(parameters, system)
         return system
 
     def check_unit_values(self, system: System, given: Sequence[str]) -> None:

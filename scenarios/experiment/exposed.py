@@ -11,11 +11,14 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
-from handover.cosim.blocks.declarations import DeclarationError
+import numpy as np
+
+from handover.cosim.blocks.declarations import DeclarationError, declared_variables
 from handover.cosim.blocks.origins import Origin
 from handover.cosim.blocks.ports import declared_field
+from handover.cosim.blocks.variable import Causality
 from handover.cosim.exceptions import nearest
-from handover.cosim.system.system import System
+from handover.cosim.system.system import PlacedUnit, System
 from handover.scenarios.experiment.needs import Need
 from handover.scenarios.experiment.places import Place
 
@@ -104,6 +107,23 @@ def carry(parameters: Any, system: System) -> System:
         placed = system.units[unit]
         system.units[unit] = replace(placed, start={**values[unit], **placed.start})
     return system
+
+
+def notes_without_effect(parameters: Any, system: System) -> list[str]:
+    """Return a line for each exposed parameter that is not at its default and that none of its units has."""
+    if not is_dataclass(parameters):
+        return []
+    declared = {v.name: v for v in declared_variables(type(parameters), Causality.PARAMETER)}
+    of_units: dict[str, list[tuple[PlacedUnit, str]]] = {}
+    for own, unit, name in exposed(parameters):
+        if unit in system.units:
+            of_units.setdefault(own, []).append((system.units[unit], name))
+    return [
+        f"{own}: it has no effect, as {' and '.join(f'{u.name} ({u.description.name}) has no {n}' for u, n in ends)}"
+        for own, ends in of_units.items()
+        if not any(name in unit.description.settable for unit, name in ends)
+        if not np.array_equal(getattr(parameters, own), declared[own].start)
+    ]
 
 
 def with_exposed(places: Mapping[str, Place], parameters: type[Any], said: str = "") -> Mapping[str, Place]:

@@ -20,10 +20,9 @@ class UnknownParameter(str):
 
     name: str
 
-    def __new__(cls, what: str, name: str, known: Iterable[str]) -> "UnknownParameter":
-        """Return it: what has no parameter, up to the name."""
-        near = _SEEDS if name == "seed" else nearest(name, known)
-        fault = super().__new__(cls, f"{what} {short_repr(name)}; {near}")
+    def __new__(cls, what: str, name: str, known: Iterable[str], hint: str = "") -> "UnknownParameter":
+        """Return it: what has no parameter, up to the name, and a hint or else the nearest names."""
+        fault = super().__new__(cls, f"{what} {short_repr(name)}; {hint or nearest(name, known)}")
         fault.name = name
         return fault
 
@@ -76,7 +75,8 @@ def texts_by_name(
             faults.append(f"{text!r} is not of the form {form}")
         elif name not in known:
             near = known if len(faults) < MOST_FAULTS else ()  # of others the message has not the names
-            faults.append(UnknownParameter(f"{experiment.name} has no parameter", name, near))
+            hint = _SEEDS if name == "seed" and experiment.is_seeded else ""
+            faults.append(UnknownParameter(f"{experiment.name} has no parameter", name, near, hint))
         elif name in texts:
             faults.append(f"{name} is given twice")
         else:

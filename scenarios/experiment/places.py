@@ -5,11 +5,12 @@ those of the unit that it ships with, so that they are declared once.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.variable import Causality, Kind, Variable
 from handover.cosim.exceptions import did_you_mean, suggestion
+from handover.cosim.fmu.file.default_experiment import proposed_step
 from handover.cosim.fmu.file.description import FmuDescription, FmuPort
 from handover.cosim.system.conversion import needs_no_conversion
 from handover.cosim.system.system import PlacedUnit, PortName, System
@@ -101,6 +102,27 @@ def presume_steps_of_places(system: System, units: Mapping[str, str]) -> None:
             system.presume_step(name, own.step, f"as {own.name} has it, whose place it takes")
 
 
+def sample_in_places(system: System, units: Mapping[str, str]) -> None:
+    """Step sampled units that take the places of the scenario's own ones so that each of their ticks begins a step.
+
+    A line says so, as it does of a unit without a sampling period of its own, which is sampled as the own one is.
+    """
+    for name in units.keys() & system.units.keys():
+        placed, own = system.units[name], find_unit(units[name])
+        d = placed.description
+        if d.name == own.name or not placed.sampled:
+            continue
+        period = proposed_step(d.step)
+        if not d.sampled:
+            line = f"has no sampling period of its own: it is called every {float(placed.period):g} s"
+        elif period and period != import_class(own.block).period and (period / placed.period).denominator != 1:
+            system.units[name] = replace(placed, period=period)
+            line = f"is sampled every {float(period):g} s, as it says, and {own.name} every {float(placed.period):g} s"
+        else:
+            continue
+        system.notes.append(f"unit {name} ({d.name}) {line}")
+
+
 def _prefer_own_outputs(system: System, units: Mapping[str, str]) -> None:
     """Let outputs that the scenario's own units have, too, feed the inputs that several outputs match."""
 
@@ -188,6 +210,11 @@ class _Fitting:
             self._system.notes.append(f"{self._what} has {'; '.join(parts)}")
         fed = {*self._system.fed_inputs(self._unit.name), *self._unit.start}
         missing = [n for names in absent.values() for n in names]
+        for name in self._unit.description.outputs:
+            if all(p.declared.name != name for p in self._ports) and (
+                meant := suggestion(name, absent[Causality.OUTPUT])
+            ):
+                self._system.notes.append(f"{self._unit.name}.{name}: nothing reads it; {meant}")
         for name in self._unit.description.inputs:
             if name not in fed and all(p.declared.name != name for p in self._ports):
                 text = f"{self._unit.name}.{name}: nothing feeds it, so it stays at its start value"

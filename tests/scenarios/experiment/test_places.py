@@ -1,14 +1,18 @@
 """What scenarios declare of their places is what they wire, with nothing left out, and runs as a compiled plan."""
 
 import re
+from dataclasses import replace
+from fractions import Fraction
 from itertools import combinations
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
+from support.cosim.native_units import native_fmu
 from support.rewritten_archive import described_otherwise
 
 from handover.cosim.blocks.variable import Causality
+from handover.cosim.fmu.file.description import describe_fmu
 from handover.cosim.master.stepper_factory import StepperFactory
 from handover.cosim.stepping.options import MasterOptions
 from handover.cosim.system.graph import system_svg
@@ -17,8 +21,9 @@ from handover.fmus.build import cached
 from handover.fmus.catalog import find_unit
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.experiment.experiment import Experiment
+from handover.scenarios.experiment.exposed import notes_without_effect
 from handover.scenarios.experiment.parameters import parse_parameters
-from handover.scenarios.experiment.places import ports_of_place
+from handover.scenarios.experiment.places import ports_of_place, sample_in_places
 
 LED = "flyer_human_to_robot"
 """A scenario whose hand can be led, by inputs from outside, for which a compiled plan does not ask."""
@@ -116,3 +121,28 @@ def test_a_unit_whose_fmu_proposes_no_step_takes_that_of_its_place(tmp_path: Pat
     system.check()
     assert system.units["push"].period == find_unit("Push").step
     assert "push: its FMU proposes no communication step; 0.016 s is taken" in "".join(system.tolerated)
+
+
+def test_a_sampled_unit_in_the_place_of_another_keeps_its_period():
+    own = replace(describe_fmu(native_fmu("gain", 3)), name="Own", sampled=True)
+    for step, period, is_noted in ((0.25, 0.25, True), (0.05, 0.05, True), (0.2, 0.1, False), (0.1, 0.1, False)):
+        s = System()
+        s.add("servo", replace(own, step=step), period=Fraction(1, 10), sampled=True)
+        sample_in_places(s, {"servo": "VisualServo"})
+        assert (float(s.units["servo"].period), bool(s.notes)) == (period, is_noted)
+    s = System()
+    s.add("servo", replace(own, sampled=False), period=Fraction(1, 10), sampled=True)
+    camera = replace(own, step=1 / 30)  # as the scenario's own, which skips pictures
+    s.add("camera", camera, period=Fraction(1, 10))
+    sample_in_places(s, {"servo": "VisualServo", "camera": "StereoCamera"})
+    assert {u.period for u in s.units.values()} == {Fraction(1, 10)}
+    assert ["no sampling period of its own" in note for note in s.notes] == [True]
+
+
+def test_a_parameter_that_only_a_replaced_unit_has_is_said_to_have_no_effect():
+    scenario, s = SCENARIOS["helix_handover"], System()
+    s.add("servo", replace(describe_fmu(native_fmu("gain", 3)), name="Own"))
+    assert notes_without_effect(parse_parameters(scenario, ["alpha=0.123"]), s) == [
+        "alpha: it has no effect, as servo (Own) has no alpha"
+    ]
+    assert notes_without_effect(scenario.parameters_type(), s) == []
