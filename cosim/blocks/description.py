@@ -26,6 +26,14 @@ from handover.cosim.blocks.variable import Causality, Kind, Variable
 
 _ATTRIBUTES = ("feedthrough", "period")
 _METHODS = ("outputs", "step", "get_state", "set_state")
+_EXPECTED = {
+    "feedthrough": 'feedthrough = {"y": ("u",)}, or {} where no input acts on an output at once',
+    "period": "period = Fraction(1, 100) of a block that is sampled, or None",
+    "outputs": "def outputs(self, t, u)",
+    "step": "def step(self, t, dt, u)",
+    "get_state": "def get_state(self)",
+    "set_state": "def set_state(self, state)",
+}
 _EVENT_METHODS = ("advance", "handle_event", "next_event")
 
 
@@ -148,8 +156,8 @@ def check_form(block: type[Any]) -> None:
     missing = [name for name in _ATTRIBUTES if not hasattr(block, name)]
     missing += [name for name in _METHODS if not callable(getattr(block, name, None))]
     if missing:
-        what = "a block has these" if len(missing) > 1 else "a block has this"
-        raise DeclarationError(block.__name__, ", ".join(missing), f"{what}; see handover.cosim.blocks.block.Block")
+        right = "; ".join(_EXPECTED[name] for name in missing)
+        raise DeclarationError(block.__name__, ", ".join(missing), f"missing; expected {right}")
     faults = [("period", _period_fault(block.period)), ("feedthrough", _feedthrough_fault(block))]
     for like in (Block, EventfulBlock, DifferentiableBlock):
         for name, method in ((n, m) for n, m in vars(like).items() if isinstance(m, FunctionType) and n[0] != "_"):

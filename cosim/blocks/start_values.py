@@ -50,6 +50,8 @@ def numbers_of(port: Declared, value: Any) -> NDArray[Any]:
     if port.kind is Kind.ENUMERATION and isinstance(value, str):
         value = {name.upper(): v for name, v in port.items}[value.upper()]
     array = np.asarray(value)
+    if array.dtype.kind == "b" and port.kind is not Kind.BOOLEAN:
+        raise ValueError("true and false are no numbers")
     is_integer = port.kind in (Kind.INTEGER, Kind.ENUMERATION) and array.dtype.kind in "iu"
     if not is_integer:  # large integers would lose digits as floats
         array = np.asarray(array, dtype=np.float64)

@@ -4,6 +4,8 @@ import array
 import logging
 from collections.abc import Callable, Sequence
 from fractions import Fraction
+from numbers import Rational
+from operator import is_not
 from pathlib import Path
 from types import TracebackType
 from typing import TypeVar
@@ -77,7 +79,7 @@ def _tell_of_faults(system: System, *, strict: bool) -> dict[Path, str]:
         _log.warning("%s: its %s is not valid, which does not matter here: %s", shown_path(path), DESCRIPTION, fault)
     for path, fault in others.items():
         _log.warning("%s: its %s is not valid: %s", shown_path(path), DESCRIPTION, fault)
-    for line in (*system.tolerated, *system.undefined_starts, *system.notes):
+    for line in system.remarks:
         _log.warning("%s", line)
     return faults
 
@@ -86,11 +88,21 @@ _MOST_STEPS = 10**12
 """Steps of the fastest unit: at the fastest they take half a day, and their record has several terabytes."""
 
 
+def _check_exact(stop: Fraction) -> None:
+    if not isinstance(stop, Rational):  # type: ignore
+        raise TypeError(f"stop = {stop!r} is not exact; give Fraction('{stop!r}')")
+
+
 def _check_steps(schedule: Schedule, stop: Fraction) -> None:
     step = min((slot.every for slot in schedule.slots), default=1) * schedule.tick
     if (stop - schedule.start) / step > _MOST_STEPS:
         many = f"more than {_MOST_STEPS:g} steps of {float(step):g} s"
         raise ScheduleError(f"until the stop time {float(stop):g} s there are {many}, too many to do")
+
+
+def _parts(system: System) -> list[object]:
+    """Return all that a system is made of, in order."""
+    return [*system.units.values(), *system.connections, *system.followed.values(), *system.externals.values()]
 
 
 class Master:
@@ -102,10 +114,11 @@ class Master:
     Args:
         system, options: what is run, and how.
         heartbeat: notes the calls of units; by default one of its own.
-        stop: when the run ends, s, at the first communication point at or after it: each unit is given the end of its
-            last step as its stop time, beyond which it need not step. Without, units have no stop time.
+        stop: when the run ends, s, exactly, at the first communication point at or after it: each unit is given the end
+            of its last step as its stop time, beyond which it need not step. Without, units have no stop time.
 
     Raises:
+        TypeError: the stop time is not exact.
         WiringError: the system has faults.
         InvalidFmu: an FMU is invalid, see `MasterOptions.strict`.
         ScheduleError: see `StepperFactory`; or there are more steps until the stop time than can be done.
@@ -129,9 +142,11 @@ class Master:
         self.system = system
         self.options = options
         self.stop = stop
+        self._parts = _parts(system)
         self._factory = StepperFactory(system, options)
         self.schedule = self._factory.schedule
         if stop is not None:
+            _check_exact(stop)
             _check_steps(self.schedule, stop)
         self.tolerances = self._factory.tolerances
         """By unit, the relative tolerance that it is given for its own solver; others choose theirs."""
@@ -150,6 +165,10 @@ class Master:
     def __enter__(self) -> "Master":
         if self._ensemble is not None and not self._is_left:
             raise RuntimeError("the master is entered already: leave it first, or make another one")
+        if len(now := _parts(self.system)) != len(self._parts) or any(map(is_not, now, self._parts)):
+            raise RuntimeError(
+                "the system was changed after this master checked it: make the master once it is complete"
+            )
         self._is_left = False
         self.ended = None
         mark_as_host()
@@ -259,6 +278,7 @@ class Master:
 
         Raises:
             UnitFailure: a unit's call failed; what observers saw before stays.
+            TypeError: `stop` is not exact, so that a step more or less would be made.
             ValueError: `stop` lies before the time that is reached, or after the stop time that units were given.
             RuntimeError: the master is left, a unit failed before, or one has ended the simulation.
         """
@@ -314,6 +334,7 @@ class Master:
             raise RuntimeError("the units are freed: call them inside of the `with` block that holds them")
 
     def _check_can_run(self, stop: Fraction) -> None:
+        _check_exact(stop)
         self._check_is_entered()
         if self.ended is not None:
             raise RuntimeError(f"{self.ended.summary}: make another master to simulate again")

@@ -160,7 +160,8 @@ class Record:
         Raises:
             KeyError: no such signal was recorded.
         """
-        return TimeSeries(self.time, self[signal].reshape(len(self.time), -1), linear=False)
+        values = self[signal].reshape(len(self.time), -1)
+        return TimeSeries(self.time, values, linear=False, unit=self.unit(signal))
 
     def row(self, k: int) -> "Record":
         """Return the record of one row alone, counted from 0, or from the last by -1."""

@@ -11,14 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handover.cosim.blocks.declarations import short_repr
-from handover.cosim.blocks.start_values import fault_of
-from handover.cosim.blocks.variable import Kind
-from handover.cosim.exceptions import UnitFailure, counted
+from handover.cosim.exceptions import UnitFailure
 from handover.cosim.fmu.file.description import FmuPort
 from handover.cosim.fmu.instance import Instance
 from handover.cosim.fmu.start_values import entries_of
 from handover.cosim.system.system import System
-from handover.cosim.system.time_series import ExternalSource
+from handover.cosim.system.time_series import ExternalSource, entries_fault
 
 _NO_ENTRIES: NDArray[Any] = np.zeros(0)
 
@@ -62,7 +60,7 @@ class ExternalInput:
         entries, fault = _NO_ENTRIES, f"got {short_repr(given)}, which is not an array of numbers"
         with contextlib.suppress(ValueError):  # rows of different lengths are no array
             entries = np.asarray(given).ravel()
-            fault = self._fault(entries)
+            fault = entries_fault(self._port, entries)
         if fault is not None:
             raise InvalidExternalValue(self._unit, f"setting {self._port.name} from outside", t, fault)
         self._values[...] = entries
@@ -74,34 +72,6 @@ class ExternalInput:
     def hold(self, entries: Sequence[Any]) -> None:
         """Hold a value that was checked before."""
         self._values[...] = entries
-
-    def _fault(self, entries: NDArray[Any]) -> str | None:
-        if len(entries) != self._port.size:
-            return f"got {len(entries)} values where {counted(self._port.size, 'is', 'are')} right"
-        if entries.dtype.kind not in "biuf":
-            return f"got {short_repr(entries.tolist())}, which is not an array of numbers"
-        if self._port.kind is not Kind.BOOLEAN and not np.isfinite(entries.astype(np.float64)).all():
-            return f"got {entries.tolist()}, which is not finite"
-        if self._port.items:
-            known = [value for _, value in self._port.items]
-            wrong = [n for n in entries.tolist() if n not in known]
-            return f"got {wrong[0]}, which is none of its items {known}" if wrong else None
-        if self._port.kind is Kind.INTEGER and (fault := _fault_of_integers(entries, self._values.dtype)):
-            return fault
-        typed = entries.astype(np.bool_ if self._port.kind is Kind.BOOLEAN else self._values.dtype)
-        value: Any = typed.reshape(self._port.shape).tolist()
-        fault = fault_of(self._port, value)
-        return None if fault is None else f"got what it cannot take: {fault}"
-
-
-def _fault_of_integers(entries: NDArray[Any], dtype: np.dtype[Any]) -> str | None:
-    """Return what is wrong with finite entries for an integer input, before they are cast to its type."""
-    if (entries != np.round(entries)).any():
-        return f"got {entries.tolist()}, expected whole numbers"
-    limits = np.iinfo(dtype)
-    if any(not limits.min <= n <= limits.max for n in entries.tolist()):
-        return f"got {entries.tolist()}, which is out of range: from {limits.min} to {limits.max}"
-    return None
 
 
 class ExternalInputs:

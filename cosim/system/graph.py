@@ -79,6 +79,9 @@ def _near_each_other(units: Sequence[str], pairs: Collection[Pair]) -> dict[str,
     return {name: 2.0 * (layout[name] - low) / np.maximum(high - low, 1e-9) - 1.0 for name in units}
 
 
+_LEAST_SCALE = 0.8
+"""Of a graph where it is shrunk to fit a page: its texts have 12 px then, of which 10 are legible."""
+
 COLOURS = ("#2f6db5", "#d1602b", "#3c8d53", "#8357a8", "#a37a10", "#4d5866", "#c2487f", "#1f8a94", "#7d5a3c")
 """Of units and of curves, in turn; the same as `--c0` and on of a report's page in its light scheme."""
 _WIDTH, _HEIGHT = 720, 400
@@ -163,7 +166,7 @@ def graph_svg(units: Sequence[DrawnUnit], signals: Mapping[Pair, Sequence[str]])
     label = html.escape(f"graph of {counted(len(names), 'unit')}. {listed}")
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:g} {height:g}" width="{width:g}" role="img" '
-        f'aria-label="{label}" style="--least-width: {0.8 * width:.0f}px; background: var(--page, #fff); '
+        f'aria-label="{label}" style="--least-width: {_LEAST_SCALE * width:.0f}px; background: var(--page, #fff); '
         f'font: 12px sans-serif">{"".join(lines)}{"".join(shown)}</svg>'
     )
 

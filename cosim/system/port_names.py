@@ -107,16 +107,17 @@ class PlacedUnit:
         return description_html(self.description)
 
 
-def check_end(end: Any, ports: str, units: Mapping[str, PlacedUnit]) -> None:
-    """Check an end of a connection.
+def check_end(end: Any, ports: str, units: Mapping[str, PlacedUnit], system: int) -> None:
+    """Check an end of a connection: a port, or all outputs or inputs of a unit.
 
     Args:
         end: of which is checked what it is.
         ports: `y` or `u`, what it should be of.
         units: those of the system, by name.
+        system: its number.
 
     Raises:
-        TypeError: it is not a port, and not all outputs or inputs of a unit.
+        TypeError: it is something else.
         ValueError: it is of another system, or all of a unit that the system does not have.
     """
     if isinstance(end, PlacedUnit):
@@ -125,20 +126,26 @@ def check_end(end: Any, ports: str, units: Mapping[str, PlacedUnit]) -> None:
     if isinstance(end, PortNames):
         if (unit := vars(end)["_unit"]) not in units:
             raise ValueError(f"{end!r}: this system has no unit {unit!r}; {nearest(unit, units)}")
-        check_system(end, vars(end)["_system"], units[unit])
-    elif not isinstance(end, PortName):
-        raise TypeError(f"{end!r} is not a port: give unit.y.NAME and unit.u.NAME of what add returned")
+        _check_system(end, vars(end)["_system"], units[unit], system)
     else:
-        check_system(end, end.system, units.get(end.unit))
+        check_port(end, f"unit.{ports}.NAME", units, system)
 
 
-def check_system(end: PortName | PortNames, system: int | None, unit: PlacedUnit | None) -> None:
-    """Check that a port, or all of a unit, is of a system's own unit of its name, where there is such a unit.
+def check_port(end: Any, right: str, units: Mapping[str, PlacedUnit], system: int) -> None:
+    """Check that an end is a port; `right` is what would be, the others are as of `check_end`.
 
     Raises:
-        ValueError: it was taken from another system.
+        TypeError: it is something else.
+        ValueError: it is of another system.
     """
-    if unit is not None and system not in (None, unit.system):
+    if not isinstance(end, PortName):
+        raise TypeError(f"{end!r:.60} is not a port: give {right} of what add returned")
+    _check_system(end, end.system, units.get(end.unit), system)
+
+
+def _check_system(end: PortName | PortNames, given: int | None, unit: PlacedUnit | None, system: int) -> None:
+    """Check that an end is of a system's own unit, of one that it was copied with, or made by its name alone."""
+    if given not in (None, system if unit is None else unit.system):
         raise ValueError(f"{end!s} is of another System: give the port of what this system's add returned")
 
 

@@ -6,7 +6,7 @@ connections whose ports do not fit each other.
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from fractions import Fraction
 from itertools import count
@@ -17,6 +17,7 @@ from typing import Any, overload
 
 from handover.cosim.blocks.variable import Causality, Kind
 from handover.cosim.exceptions import InvalidFmu, WiringError
+from handover.cosim.fmu.file.archive import description_state
 from handover.cosim.fmu.file.default_experiment import (
     NO_STEP,
     DefaultExperiment,
@@ -43,7 +44,7 @@ from handover.cosim.system.port_names import (
     PortNames,
     ambiguity,
     check_end,
-    check_system,
+    check_port,
     unit_of,
 )
 from handover.cosim.system.time_series import ExternalSource, NoSource, TimeSeries
@@ -52,7 +53,10 @@ from handover.cosim.system.wiring_faults import (
     connection_doubt,
     connection_faults,
     event_faults,
+    no_unit,
     outside_fault,
+    period_doubt,
+    port_fault,
     series_fault,
     value_faults,
 )
@@ -79,20 +83,31 @@ class System:
         self.externals: dict[PortName, ExternalSource] = {}
         """By input, the sources of inputs that come from outside."""
         self.notes: list[str] = []
-        """What who runs it should know before it starts, in lines, such as connections and values that its units do not
-        have and need not have."""
+        """Lines to show before it is run or exported, such as connections and values that its units need not have."""
         self._faults: list[str] = []
         self._step_faults: dict[str, NoStep] = {}  # by unit that has no communication step
         self._presumed_steps: dict[str, str] = {}  # by unit, what its step was taken from
         self._tolerated: list[str] = []
-        self._descriptions: dict[Path, FmuDescription] = {}
+        self._descriptions: dict[tuple[Path, tuple[int, int] | None], FmuDescription] = {}
         self._number = next(_NUMBERS)  # which its units and their ports have
+
+    def __copy__(self) -> "System":
+        """Return a system with the same units, whose ports are valid in both; a change of one leaves the other."""
+        made = System()
+        for name, value in vars(self).items():
+            if name != "_number":
+                setattr(made, name, value.copy() if isinstance(value, (dict, list)) else value)
+        made._sources = {unit: {**sources} for unit, sources in self._sources.items()}
+        made._matches = {target: [*matches] for target, matches in self._matches.items()}
+        return made
 
     def add(
         self, name: str, fmu: Path | str | FmuDescription, *, period: Fraction | None = None,
-        sampled: bool | None = None, **start: Any,
+        sampled: bool | None = None, start: Mapping[str, Any] | None = None, **values: Any,
     ) -> PlacedUnit:  # fmt: skip
-        """Add a unit under a name, with start values of its parameters and inputs.
+        """Add a unit under a name, with start values of its parameters and inputs, `add("arm", "arm.fmu", m=2.0)`.
+
+        `start` has those whose names are none in Python, or are those of arguments: `start={"period": 0.5}`.
 
         `period` is its communication step in seconds. By default it is the step that its FMU proposes, or else a 500th
         of its default experiment, to one digit. `sampled` says whether it computes at instants, by default as its FMU
@@ -101,12 +116,18 @@ class System:
 
         Raises:
             InvalidFmu: the file is not a valid co-simulation FMU.
-            TypeError: the period is not exact, or another argument is of another type.
+            TypeError: the period is not exact, an argument is of another type, or a value is given twice.
         """
         if not isinstance(name, str):  # type: ignore
             raise TypeError(f"name = {name!r:.60}: expected a text, such as 'arm'")
         if not isinstance(fmu, (str, PathLike, FmuDescription)):  # type: ignore
             raise TypeError(f"unit {name}: fmu = {fmu!r:.60}: expected the path of an FMU, such as 'arm.fmu'")
+        if not (sampled is None or isinstance(sampled, bool)):  # type: ignore
+            raise TypeError(f"unit {name}: sampled = {sampled!r:.60}: expected True or False{_as_value('sampled')}")
+        if not (start is None or isinstance(start, Mapping)):  # type: ignore
+            raise TypeError(f"unit {name}: start = {start!r:.60}: expected values by name{_as_value('start')}")
+        if twice := [n for n in start or {} if n in values]:
+            raise TypeError(f"unit {name}: {', '.join(twice)} stands in start and besides it: give one value")
         description = fmu if isinstance(fmu, FmuDescription) else self._described(Path(fmu))
         if not re.fullmatch(UNIT_NAME, name):
             self._faults.append(f"a unit is called {name!r:.60}: expected a name that is seen, in one line")
@@ -114,7 +135,7 @@ class System:
             self._faults.append(f"two units are called {name!r}")
         period = self._period(name, description.experiment, period)
         is_sampled = description.sampled if sampled is None else sampled
-        unit = PlacedUnit(name, description, start, period, is_sampled, self._number)
+        unit = PlacedUnit(name, description, {**(start or {}), **values}, period, is_sampled, self._number)
         self.units[name] = unit
         return unit
 
@@ -179,7 +200,7 @@ class System:
             ValueError: an end is a port of another `System`, or a whole unit is not of this one.
         """
         for end, ports in ((source, "y"), (target, "u")):
-            check_end(end, ports, self.units)
+            check_end(end, ports, self.units, self._number)
         if isinstance(source, PortNames) or isinstance(target, PortNames):
             if transformation is not None:
                 raise TypeError("a transformation is for one connection: give unit.y.NAME and unit.u.NAME")
@@ -260,11 +281,14 @@ class System:
         """Remove the connections of a port, or of all ports of a terminal, and what they are set to or follow.
 
         Raises:
-            ValueError: the terminal has a fault, so that its ports are not known, or it is of another `System`.
+            ValueError: there is no such port, it is of another `System`, or the terminal has a fault, so that its ports
+                are not known.
             TypeError: it is not a port.
         """
         self._check_port(end, "unit.y.NAME or unit.u.NAME")
         if (found := self._terminal(end)) is None:
+            if fault := port_fault(self.units, end):
+                raise ValueError(fault)
             self.disconnect_port(end)
             return
         _, _, terminal = found
@@ -278,9 +302,11 @@ class System:
 
         Raises:
             TypeError: it is not a port.
-            ValueError: it is of another `System`.
+            ValueError: it is of another `System`, or there is no such unit.
         """
         self._check_port(end, "unit.y.NAME or unit.u.NAME")
+        if end.unit not in self.units:
+            raise ValueError(no_unit(self.units, end))
         self._matches.pop(end, None)
         for matches in self._matches.values():
             matches[:] = [m for m in matches if m.source != end]
@@ -296,6 +322,27 @@ class System:
         for target, (match,) in [(t, m) for t, m in self._matches.items() if len(m) == 1]:
             if target.port not in self._sources.get(target.unit, {}):
                 self._add(match)
+
+    def remove(self, name: str) -> None:
+        """Remove a unit with all that is said of it.
+
+        Raises:
+            KeyError: there is no such unit.
+        """
+        del self.units[name]
+        for table in (self._sources, self._step_faults, self._presumed_steps):
+            table.pop(name, None)
+        for ends in (self._matches, self.followed, self.externals):
+            for end in [end for end in ends if end.unit == name]:
+                del ends[end]
+        for target, matches in [*self._matches.items()]:
+            matches[:] = [c for c in matches if c.source.unit != name]
+            if not matches:
+                del self._matches[target]
+        self.connections = [c for c in self.connections if name not in (c.source.unit, c.target.unit)]
+        for sources in self._sources.values():
+            for port in [port for port, source in sources.items() if source.unit == name]:
+                del sources[port]
 
     def prefer_matches(self, is_preferred: Callable[[PortName], bool]) -> dict[PortName, list[PortName]]:
         """Where several outputs match an input, leave those that are not preferred.
@@ -393,8 +440,8 @@ class System:
             fed[c.target] = c.source
         for end, series in self.followed.items():
             faults += series_fault(self.units, end, self._sources.get(end.unit, {}), series)
-        for end in self.externals:
-            faults += outside_fault(self.units, end, self._sources.get(end.unit, {}), self.followed)
+        for end, source in self.externals.items():
+            faults += outside_fault(self.units, end, self._sources.get(end.unit, {}), self.followed, source)
         if faults:
             raise WiringError(faults)
 
@@ -420,12 +467,13 @@ class System:
     @property
     def tolerated(self) -> list[str]:
         """What is not as it should be with a checked system that can be run nonetheless; see `MasterOptions.strict`."""
-        doubts = (connection_doubt(self.units, c) for c in self.connections)
+        doubts = [*map(period_doubt, self.units.values())]
+        doubts += [connection_doubt(self.units, c) for c in self.connections]
         return [*self._presumed_steps.values(), *self._tolerated, *filter(None, doubts)]
 
     @property
     def remarks(self) -> list[str]:
-        """What who runs it, or writes it as a file, should know before: `tolerated`, `undefined_starts`, `notes`."""
+        """Lines to show before a run or an export: `tolerated`, `undefined_starts` and `notes`."""
         return [*self.tolerated, *self.undefined_starts, *self.notes]
 
     @property
@@ -479,7 +527,8 @@ class System:
     def _period(self, name: str, proposed: DefaultExperiment, period: Fraction | None) -> Fraction:
         if period is not None and not isinstance(period, Rational):  # type: ignore
             exact = Fraction(str(period)) if isinstance(period, float) else "1/100"
-            raise TypeError(f"{name}: period = {period!r} is not exact, so time would drift; give Fraction('{exact}')")
+            right = f"give Fraction('{exact}'){_as_value('period')}"
+            raise TypeError(f"{name}: period = {period!r} is not exact, so time would drift; {right}")
         self._step_faults.pop(name, None)
         self._presumed_steps.pop(name, None)
         if period is not None and period > 0:
@@ -494,19 +543,30 @@ class System:
         return Fraction(1, 100)  # any: `check` reports the fault, but more units can be added until then
 
     def _check_port(self, end: object, right: str = "unit.u.NAME") -> None:
-        if not isinstance(end, PortName):
-            raise TypeError(f"{end!r:.60} is not a port: give {right} of what add returned")
-        check_system(end, end.system, self.units.get(end.unit))
+        check_port(end, right, self.units, self._number)
 
     def _presume(self, name: str, step: Fraction, source: str) -> None:
         self._presumed_steps[name] = f"{name}: {NO_STEP}; {float(step):g} s is taken, {source}"
 
     def _described(self, path: Path) -> FmuDescription:
-        if path not in self._descriptions:
-            if str(path).isidentifier() and not path.exists():
-                raise InvalidFmu(path, f"there is no such file; a unit of the catalog is handover.unit({str(path)!r})")
-            self._descriptions[path] = describe_fmu(path)
-        return self._descriptions[path]
+        if str(path).isidentifier() and not path.exists():
+            raise InvalidFmu(path, f"there is no such file; a unit of the catalog is handover.unit({str(path)!r})")
+        key = path, _state(path)  # an FMU that was built anew is another one
+        if key not in self._descriptions:
+            self._descriptions[key] = describe_fmu(path)
+        return self._descriptions[key]
+
+
+def _state(fmu: Path) -> tuple[int, int] | None:
+    try:
+        return description_state(fmu)
+    except OSError:
+        return None
+
+
+def _as_value(name: str) -> str:
+    """Return how a variable of an FMU is given that is named like an argument."""
+    return f"; a variable that is called so is given by start={{{name!r}: VALUE}}"
 
 
 def _ports_of(unit: str, ends: Iterable[PortName]) -> list[str]:

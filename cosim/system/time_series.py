@@ -6,7 +6,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from handover.cosim.blocks.declarations import short_repr
 from handover.cosim.blocks.ports import Floats
+from handover.cosim.blocks.start_values import fault_of
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import counted
 from handover.cosim.fmu.file.description import FmuPort
@@ -26,15 +28,18 @@ class TimeSeries:
         times: in seconds, shape [n], none below the one before it.
         values: shape [n, size], entries of an array in row-major order; in the unit of the input.
         linear: whether values between two times lie on a line.
+        unit: symbol of the unit of measurement that the values are known to be in; the input's must be the same.
 
     Raises:
         ValueError: there are no times, they descend, numbers are not finite, or there is not one row a time.
     """
 
-    def __init__(self, times: Sequence[float] | Floats, values: Any, *, linear: bool) -> None:
+    def __init__(
+        self, times: Sequence[float] | Floats, values: Any, *, linear: bool, unit: str | None = None
+    ) -> None:  # fmt: skip
         self.times: Floats = np.asarray(times, dtype=np.float64)
         self.values: NDArray[Any] = np.asarray(values)
-        self.linear = linear
+        self.linear, self.unit = linear, unit
         if self.times.ndim != 1 or not len(self.times):
             raise ValueError("a series needs one time at least")
         if self.values.ndim != 2 or len(self.values) != len(self.times):
@@ -62,7 +67,15 @@ class TimeSeries:
             return f"it can be set only while its clock {port.clocks[0]} ticks, so it cannot follow values over time"
         if self.values.shape[1] != port.size:
             return f"{self.values.shape[1]} values a time where {counted(port.size, 'is', 'are')} right"
-        return None if not self.linear or port.is_continuous else "its values are held: it does not vary continuously"
+        if self.linear and not port.is_continuous:
+            return "its values are held: it does not vary continuously"
+        if port.kind is Kind.REAL and self.unit and port.unit.symbol not in ("", self.unit):
+            return f"values in {self.unit} where {port.unit} is right"
+        if port.kind is Kind.REAL and len(self.values) > 2:  # what is between the least and the most is in range, too
+            rows = np.stack((self.values.min(axis=0), self.values.max(axis=0)))
+        else:
+            rows = np.unique(self.values, axis=0)
+        return next((fault for row in rows if (fault := entries_fault(port, row))), None)
 
 
 class HeldValue(TimeSeries):
@@ -84,8 +97,17 @@ class HeldValue(TimeSeries):
         return self.values[0]
 
     def set(self, entries: Sequence[Any] | NDArray[Any]) -> None:
-        """Hold another value of as many entries from now on."""
-        self.values[0] = entries
+        """Hold another value of as many entries from now on.
+
+        Raises:
+            ValueError: these are others, not finite, or not of the type of the first.
+        """
+        given = np.asarray(entries)
+        typed = given.astype(self.values.dtype)
+        if typed.shape != self.entries.shape or not ((typed == given) & np.isfinite(typed)).all():
+            right = f"{counted(len(self.entries), 'finite number')} of type {typed.dtype}"
+            raise ValueError(f"{short_repr(given)} cannot be held here: expected {right}")
+        self.values[0] = typed
 
 
 class ExternalSource(Protocol):
@@ -107,6 +129,21 @@ class NoSource:
     def at(self, t: float) -> None:  # noqa: ARG002
         """Let the value hold."""
         return
+
+
+def entries_fault(port: FmuPort, entries: NDArray[Any]) -> str | None:
+    """Return what is wrong with a value for an input, given by its entries in row-major order, or None."""
+    if len(entries) != port.size:
+        return f"got {len(entries)} values where {counted(port.size, 'is', 'are')} right"
+    if entries.dtype.kind not in "biuf":
+        return f"got {short_repr(entries.tolist())}, which is not an array of numbers"
+    known = (0, 1) if port.kind is Kind.BOOLEAN else [value for _, value in port.items]
+    if wrong := [n for n in entries.tolist() if known and n not in known]:
+        return f"got {wrong[0]}, which is {'no boolean' if port.kind is Kind.BOOLEAN else f'none of its items {known}'}"
+    if port.kind is Kind.BOOLEAN:
+        return None
+    fault = fault_of(port, entries.reshape(port.shape).tolist())
+    return None if fault is None else f"got what it cannot take: {fault}"
 
 
 def external_fault(port: FmuPort) -> str | None:

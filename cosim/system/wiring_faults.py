@@ -8,10 +8,11 @@ from handover.cosim.blocks.units import Unit
 from handover.cosim.blocks.variable import ELEMENT, Kind
 from handover.cosim.exceptions import hints, nearest
 from handover.cosim.fmu.file.clocks import FmuClock
+from handover.cosim.fmu.file.default_experiment import proposed_step
 from handover.cosim.fmu.file.description import FmuDescription, FmuPort
 from handover.cosim.system.conversion import LinearTransformation, needs_no_conversion
 from handover.cosim.system.port_names import BY_ENTRIES, Connection, PlacedUnit, PortName
-from handover.cosim.system.time_series import TimeSeries, external_fault
+from handover.cosim.system.time_series import ExternalSource, TimeSeries, external_fault
 
 
 def value_faults(unit: str, description: FmuDescription, start: Mapping[str, Any]) -> list[str]:
@@ -46,6 +47,18 @@ def event_faults(name: str, description: FmuDescription, sampled: bool) -> list[
     if not d.capabilities.event_mode:
         return [f"{fault}, which its FMU does not have (hasEventMode)"]
     return [f"{fault}; it cannot be placed as a sampled unit, which runs without"] if sampled else []
+
+
+def period_doubt(unit: PlacedUnit) -> str:
+    """Return in a line that a sampled unit's ticks are not at the begins of its steps; empty where they are.
+
+    Several ticks may lie in one step, if all steps have as many.
+    """
+    own = proposed_step(unit.description.step) if unit.sampled and unit.description.sampled else None
+    if own is None or 1 in ((own / unit.period).denominator, (unit.period / own).denominator):
+        return ""
+    step = f"its communication step of {float(unit.period):g} s"
+    return f"{unit.name}: it samples every {float(own):g} s, of which {step} is no part: its ticks act at steps' begins"
 
 
 _WHOLE = (Kind.INTEGER, Kind.ENUMERATION)
@@ -140,6 +153,7 @@ def outside_fault(
     target: PortName,
     sources: Mapping[str, PortName],
     followed: Mapping[PortName, TimeSeries],
+    given: ExternalSource,
 ) -> list[str]:
     """Return why an input cannot come from outside; `followed` are the values over time of inputs."""
     port, fault = _find(units, target, "input")
@@ -147,7 +161,8 @@ def outside_fault(
         fault = f"fed by {sources[target.port]}, so it cannot come from outside"
     elif port is not None and target in followed:
         fault = "follows values over time, so it cannot come from outside"
-    fault = fault or (external_fault(port) if port is not None else None)
+    if fault is None and port is not None:
+        fault = external_fault(port) or (given.fault(port) if isinstance(given, TimeSeries) else None)
     return [f"{target}: {fault}"] if fault else []
 
 
@@ -157,11 +172,25 @@ def clock_of(units: Mapping[str, PlacedUnit], end: PortName) -> FmuClock | None:
     return unit.description.clocks.get(end.port) if unit else None
 
 
+def no_unit(units: Mapping[str, PlacedUnit], end: PortName) -> str:
+    """Return that there is no unit of an end's name, with the nearest names."""
+    return f"there is no unit {end.unit!r}; {nearest(end.unit, units)}"
+
+
+def port_fault(units: Mapping[str, PlacedUnit], end: PortName) -> str | None:
+    """Return that an end is no output, input, parameter or clock of a unit, or None."""
+    if (unit := units.get(end.unit)) is None:
+        return no_unit(units, end)
+    d = unit.description
+    ports = [*d.outputs, *d.settable, *d.clocks]
+    return None if end.port in ports else f"{end.unit} has no port {end.port!r}; {nearest(end.port, ports)}"
+
+
 def _find(units: Mapping[str, PlacedUnit], end: PortName, role: str) -> tuple[FmuPort | None, str | None]:
     """Return an input or output, or why there is none."""
     unit = units.get(end.unit)
     if unit is None:
-        return None, f"there is no unit {end.unit!r}; {nearest(end.unit, units)}"
+        return None, no_unit(units, end)
     d = unit.description
     ports, others = (d.outputs, d.inputs) if role == "output" else (d.inputs, d.outputs)
     if end.port in ports:

@@ -62,7 +62,7 @@ def errors_for_python(
         InvalidInput: see there.
         UnitFailure: a unit failed before anything ran.
         RecordNotWritten: the disk is full.
-            ClusterLost: a campaign's workers were lost.
+        ClusterLost: a campaign's workers were lost.
     """
     try:
         with one_line_errors():
@@ -103,6 +103,7 @@ _ARGUMENTS = {
     "--metric": "metrics",
     "-p": "parameters",
     "--inputs-from": "inputs_from",
+    "--repeat": "seeds",
     **{f"--{name}": name for name in ("algorithm", "checkpoint", "isolate", "out", "record", "scheduler")},
     **{f"--{name}": name for name in ("seed", "seeds", "start", "step", "stop", "workers")},
 }

@@ -114,8 +114,8 @@ class Campaign:
         """Write the report page into the folder, and return it.
 
         Raises:
-            InvalidInput: a file of the folder is damaged, or the extra `reports` is not installed. RecordNotWritten:
-                the disk is full.
+            InvalidInput: a file of the folder is damaged, or the extra `reports` is not installed.
+            RecordNotWritten: the disk is full.
         """
         with errors_for_python():
             require_extra("reports", "reports")

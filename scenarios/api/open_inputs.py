@@ -4,6 +4,7 @@ No unit is replaced by another kind of object: the inputs that no output feeds, 
 them, follow a `HeldValue`, which the master passes to the real units at their communication points.
 """
 
+import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -65,18 +66,9 @@ class OpenSystem:
     def __init__(self, system: System, left_out: str | None = None) -> None:
         if left_out is not None:
             _check_place(system, left_out)
-        self.system, self.free = System(), dict[str, HeldValue]()
-        self.system.start = system.start
-        self.system.units = {name: unit for name, unit in system.units.items() if name != left_out}
-        for c in system.connections:
-            if left_out not in (c.source.unit, c.target.unit):
-                self.system.connect(c.source, c.target, c.transformation)
-        for end, series in system.followed.items():
-            if end.unit in self.system.units:
-                self.system.follow(end, series)
-        for end, source in system.externals.items():
-            if end.unit in self.system.units:
-                self.system.external(end, source)
+        self.system, self.free = copy.copy(system), dict[str, HeldValue]()
+        if left_out is not None:
+            self.system.remove(left_out)
         for name, unit in self.system.units.items():
             fed = {*self.system.fed_inputs(name)}
             for port in unit.description.inputs.values():

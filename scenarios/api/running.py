@@ -126,6 +126,10 @@ def run(
     return Run(task.folder.shown, task.experiment if isinstance(subject, type) else None)
 
 
+_OF_EPISODES = {"seed": "an episode's seed is given by reset(seed=3)"}
+"""Arguments of `handover.run` that an environment has not, and what is right instead."""
+
+
 def environment(
     scenario: str | type[Experiment[Any]],
     /,
@@ -162,7 +166,7 @@ def environment(
     """
     from handover.scenarios.api.environment import ScenarioEnvironment  # needs Gymnasium, an extra
 
-    with errors_for_python():
+    with errors_for_python(named, environment, _OF_EPISODES):
         check_subject(scenario)
         request = RunRequest(
             subject=scenario,

@@ -56,7 +56,7 @@ class SavedState:
         asked: the time until which it was stepped, s.
         seen: the last time that the evaluation has seen, s; -inf before the first step.
         given: outputs of the unit that is left out which the evaluation sees.
-        settings: of the session: the scenario's parameters, and the start values of its units, as texts.
+        settings: of the session, as texts: the scenario's parameters, its units' FMUs and start values, its wiring.
     """
 
     checkpoint: Checkpoint
@@ -221,7 +221,7 @@ class Session:
         Raises:
             InvalidInput: it is the state of another system, or of one with other parameters, which are no part of the
                 state. Of another seed it is taken, as the state has the random numbers', unless that sets parameters.
-                UnitFailure: a unit does not take it.
+            UnitFailure: a unit does not take it.
             RuntimeError: a unit has ended the simulation.
         """
         if self._master.ended is not None:
@@ -245,13 +245,13 @@ class Session:
         self._asked, self._seen = state.asked, state.seen
 
     def _check_settings(self, state: SavedState) -> None:
-        """Reject the state of a session of the same units with other parameters."""
+        """Reject the state of a session of units of the same names that is another system, or has other parameters."""
         if {*state.checkpoint.units} != {*self._open.system.units}:
             return  # which the checkpoint tells
         here, there, usual = self._settings, state.settings, "as usual"
         if other := [name for name in {**here, **there} if here.get(name) != there.get(name)]:
             values = [f"{n} was {there.get(n, usual):.40} and is {here.get(n, usual):.40}" for n in other]
-            same = "open a session with the same parameters and seed"
+            same = "open a session of the same system with the same parameters and seed"
             raise InvalidInput(
                 f"the state is of a session with other settings: {', '.join(first_faults(values))}; {same}"
             )
@@ -416,14 +416,21 @@ def open(  # noqa: A001 (handover.open is named like it)
 
 
 def _settings(experiment: Experiment[Any], parameters: Any, system: System) -> dict[str, str]:
-    """Return the parameters of a scenario, and the start values of a system's units as `UNIT.NAME`, as texts.
+    """Return the parameters of a scenario, and of a system the FMUs, start values, and what feeds inputs, as texts.
 
     Seeds are left out: what is drawn is part of a unit's state.
     """
     given = ((f"{u.name}.{name}", value) for u in system.units.values() for name, value in u.start.items())
     starts = [(name, value) for name, value in given if not name.endswith(".seed")]
     of_units = {name: repr(value.tolist() if hasattr(value, "tolist") else value) for name, value in starts}
-    return {v.name: text_of(v, getattr(parameters, v.name)) for v in experiment.parameters()} | of_units
+    fmus = {
+        f"the FMU of {u.name}": f"{u.description.name} {u.description.token}, FMI {u.description.fmi}"
+        for u in system.units.values()
+    }
+    wiring = {
+        f"what feeds {c.target}": f"{c.source}{f' {t}' if (t := c.transformation) else ''}" for c in system.connections
+    }
+    return {v.name: text_of(v, getattr(parameters, v.name)) for v in experiment.parameters()} | fmus | of_units | wiring
 
 
 def _plain(value: Any) -> Any:

@@ -78,6 +78,19 @@ def test_a_run_ends_when_an_observer_ends_it(fmu: FmuOf):
         assert master.time == 0.7
 
 
+def test_stops_are_exact_and_a_system_that_was_changed_since_is_not_loaded(fmu: FmuOf):
+    s = System()
+    s.add("counter", fmu("Counter"))
+    with pytest.raises(TypeError, match=r"Fraction\('0.07'\)"):
+        Master(s, stop=0.07)  # type: ignore
+    with Master(s) as master, pytest.raises(TypeError, match=r"Fraction\('0.07'\)"):
+        master.run(0.07)  # type: ignore
+    late = Master(s)
+    s.add("mass", fmu("Mass"))
+    with pytest.raises(RuntimeError, match="was changed"):
+        late.__enter__()
+
+
 def test_a_unit_that_refuses_its_parameters_is_named_with_its_reason(fmu: FmuOf):
     s = System()
     s.add("picky", fmu("Picky"), low=3.0, high=2.0)

@@ -2,6 +2,7 @@
 
 import zipfile
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -13,8 +14,11 @@ from support.cosim.observed_rows import observed_rows
 from support.cosim.ssp_schemas import expect_valid
 from support.wording import Wording
 
-from handover.cosim.blocks.ports import Floats
+from handover.cosim.blocks.ports import Floats, Width
+from handover.cosim.blocks.units import BaseExponents, Unit
+from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import NotExportable, WiringError
+from handover.cosim.fmu.file.description import describe_fmu
 from handover.cosim.master.master import Master
 from handover.cosim.record.reader import Record
 from handover.cosim.record.recorder import Recorder
@@ -23,7 +27,7 @@ from handover.cosim.ssp.writing import write_ssp
 from handover.cosim.stepping.external_inputs import InvalidExternalValue
 from handover.cosim.stepping.options import AdaptiveStep, Algorithm, MasterOptions
 from handover.cosim.system.system import PortName, System
-from handover.cosim.system.time_series import ExternalSource, TimeSeries
+from handover.cosim.system.time_series import ExternalSource, HeldValue, TimeSeries
 
 
 class Asked:
@@ -150,6 +154,48 @@ def test_what_cannot_come_from_outside_or_follow_is_refused_with_its_name(way: C
         system.check()
     assert len(refused.value.faults) == 7
     wording.check(refused.value)
+
+
+WHOLE: dict[str, Any] = {"kind": Kind.INTEGER, "fmi_type": "Int32", "width": Width.INT32}
+
+
+@pytest.mark.parametrize("way", [System.external, System.follow])
+@pytest.mark.parametrize(
+    ("kind", "values", "unit"),
+    [
+        (WHOLE, [[0.7]], None),
+        (WHOLE, [[0], [2**40]], None),
+        ({"kind": Kind.BOOLEAN, "fmi_type": "Boolean"}, [[1], [2]], None),
+        ({"kind": Kind.ENUMERATION, "fmi_type": "Int64", "items": (("A", 1), ("B", 2))}, [[1], [2], [3]], None),
+        ({"maximum": 10.0}, [[0.0], [11.0], [0.0]], None),
+        ({"unit": Unit("N", BaseExponents(kg=1, m=1, s=-2))}, [[0.0], [1.0], [2.0]], "kN"),
+    ],
+)
+def test_values_over_time_that_an_input_cannot_take_are_refused(
+    kind: dict[str, Any], values: list[list[float]], unit: str | None, way: Callable[..., None]
+):
+    d = describe_fmu(native_fmu("gain", 3))
+    system = System()
+    placed = system.add("a", replace(d, inputs={"u": replace(d.inputs["u"], **kind)}))
+    for rows, of_unit, is_right in ((values, unit, False), (values[:1] if len(values) > 1 else [[0]], None, True)):
+        way(system, placed.u.u, TimeSeries([float(k) for k in range(len(rows))], rows, linear=False, unit=of_unit))
+        if is_right:
+            system.check()
+        else:
+            with pytest.raises(WiringError) as refused:
+                system.check()
+            assert len(refused.value.faults) == 1
+            assert refused.value.faults[0].startswith("a.u: ")
+
+
+def test_a_held_value_is_set_to_what_it_can_hold():
+    held = HeldValue([1])
+    held.set([2.0])
+    assert held.entries.tolist() == [2]
+    for wrong in ([0.5], [np.nan], [1, 2]):
+        with pytest.raises(ValueError, match="cannot be held here"):
+            held.set(wrong)
+    assert held.entries.tolist() == [2]
 
 
 def test_a_resumed_run_goes_on_with_what_was_given_at_its_point():

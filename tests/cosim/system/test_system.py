@@ -195,6 +195,7 @@ def test_a_port_of_another_system_is_not_taken_for_this_ones_by_its_units_name(f
         lambda: s.connect(own.y.x, theirs.u.f),
         lambda: s.connect(theirs.y, own.u),
         lambda: s.disconnect(theirs.u.f),
+        lambda: s.connect(other.add("sprint", fmu("Spring")).y.f, own.u.f),  # of which this has no unit yet
         lambda: s.external(theirs.u.f),
         lambda: s.follow(theirs.u.f, TimeSeries(np.zeros(1), np.ones((1, 1)), linear=True)),
     ):
@@ -203,8 +204,82 @@ def test_a_port_of_another_system_is_not_taken_for_this_ones_by_its_units_name(f
     assert not s.connections
     assert not s.externals
     assert not s.followed
-    copied = copy(s)
-    copied.connect(own.y.x, own.u.f)  # a copy has the same units
+
+
+def test_a_copy_has_the_same_units_and_its_changes_are_its_own(fmu: FmuOf):
+    s = System()
+    mass, spring = s.add("mass", fmu("Mass")), s.add("spring", fmu("Spring"))
+    s.connect(spring.y, mass.u)
+    made = copy(s)
+    assert made.connections == s.connections != []
+    made.external(mass.u.f)
+    made.connect(mass.y.x, spring.u.x)
+    made.notes.append("of the copy")
+    added = made.add("other", fmu("Mass"))
+    assert (s.connections, s.externals, s.notes) == (copy(s).connections, {}, [])
+    assert [str(c.source) for c in s.connections] == ["spring.f"]
+    assert "other" not in s.units
+    with pytest.raises(ValueError, match="another System"):
+        s.connect(added.y.x, spring.u.x)
+    made.check()
+
+
+def test_what_is_said_of_a_unit_goes_with_it(fmu: FmuOf):
+    s = System()
+    a, b, spring = s.add("a", fmu("Mass")), s.add("b", fmu("Mass")), s.add("spring", fmu("Spring"))
+    s.connect(a.y.x, spring.u.x)
+    s.connect(spring.y, b.u)
+    s.external(a.u.f)
+    s.remove("spring")
+    assert (s.connections, s.sources_of("b"), [*s.externals]) == ([], {}, [a.u.f])
+    s.remove("a")
+    assert not s.externals
+    s.check()
+
+
+def test_variables_that_are_named_like_arguments_are_given_by_name(edited: Edited, wording: Wording):
+    file = edited("mass", 2, ('name="m"', 'name="period"'), ('name="k"', 'name="sampled"'))
+    s = System()
+    unit = s.add("a", file, start={"period": 2.0, "sampled": 1.0})
+    assert (dict(unit.start), unit.sampled) == ({"period": 2.0, "sampled": 1.0}, unit.description.sampled)
+    s.check()
+    for given in ({"sampled": 1.0}, {"start": 0.5}, {"period": 0.5}, {"start": {"f": 1.0}, "f": 1.0}):
+        with pytest.raises(TypeError) as refused:
+            s.add("b", file, **dict[str, Any](given))
+        wording.check(refused.value)
+
+
+def test_a_number_is_not_true(fmu: FmuOf):
+    s = System()
+    s.add("mass", fmu("Mass"), m=True)
+    assert ["True" in fault for fault in faults_of(s)] == [True]
+
+
+def test_an_fmu_that_was_built_anew_is_read_anew(tmp_path: Path):
+    file, s = tmp_path / "a.fmu", System()
+    for block in ("mass", "gain"):
+        file.write_bytes(native_fmu(block).read_bytes())
+        assert s.add(block, file).description.name == block
+
+
+def test_only_ports_that_are_there_are_disconnected(fmu: FmuOf):
+    s = System()
+    mass = s.add("mass", fmu("Mass"), m=2.0)
+    for end, named in ((mass.u.ff, "f"), (PortName("mas", "f"), "mass")):
+        with pytest.raises(ValueError, match=rf"\b{named}\b"):
+            s.disconnect(end)
+    s.disconnect(mass.u.m)
+    assert not s.units["mass"].start
+
+
+@pytest.mark.parametrize(
+    ("period", "is_moved"), [("1/4", False), ("1/8", False), ("1/2", False), ("1/10", True), ("1/3", True)]
+)
+def test_ticks_that_do_not_begin_steps_are_named(period: str, is_moved: bool):
+    own, s = replace(describe_fmu(native_fmu("gain", 3)), sampled=True, step=0.25), System()
+    s.add("servo", own, period=Fraction(period))
+    s.add("step", replace(own, sampled=False), period=Fraction(period))
+    assert [line.partition(":")[0] for line in s.tolerated] == ["servo"] * is_moved
 
 
 def test_a_port_whose_name_is_no_identifier_is_named_by_key(edited: Edited):

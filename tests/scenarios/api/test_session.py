@@ -153,6 +153,31 @@ def test_a_state_of_a_session_with_other_parameters_is_refused(
     assert all(f"{name} was " in str(refused.value) for name in named)
 
 
+def test_a_state_of_other_wiring_or_of_another_fmu_is_refused():
+    def chain(fed: str, fmi: int = 3) -> handover.System:
+        s = handover.System()
+        a, b, last = (s.add(name, native_fmu("gain", fmi if name == "a" else 3)) for name in ("a", "b", "last"))
+        s.connect({"a": a, "b": b}[fed].y.y, last.u.u)
+        return s
+
+    with handover.open(chain("a")) as s:
+        state = s.save()
+        s.restore(state)
+    for other, named in ((chain("b"), "last.u was a.y and is b.y"), (chain("a", 2), "the FMU of a was ")):
+        with handover.open(other) as s, pytest.raises(handover.InvalidInput) as refused:
+            s.restore(state)
+        assert named in str(refused.value)
+
+
+def test_what_a_run_warns_of_and_strict_refuses_is_so_in_a_session(caplog: pytest.LogCaptureFixture):
+    system = gain(native_fmu("gain"))
+    system.tolerate("something is odd")
+    with handover.open(system):
+        assert "something is odd" in caplog.messages
+    with pytest.raises(handover.InvalidInput, match="something is odd"):
+        handover.open(system, options=handover.MasterOptions(strict=True))
+
+
 @pytest.mark.parametrize("name", ["stop", "inputs", "out"])
 def test_arguments_of_runs_alone_are_reported_as_such(name: str):
     with pytest.raises(handover.InvalidInput) as refused:

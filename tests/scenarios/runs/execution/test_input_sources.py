@@ -114,6 +114,11 @@ def test_a_system_wired_in_python_is_played_back(tmp_path: Path):
     a, b = ((tmp_path / name / "signals.parquet").read_bytes() for name in "ab")
     assert a == b
     assert Record(tmp_path / "b" / "signals.parquet")["mass.v"][-1] != 0.0
+    own = pushed_mass(None)
+    handover.run(own, out=tmp_path / "c", inputs_from=tmp_path / "a", **at)
+    handover.run(own, out=tmp_path / "d", **at)
+    assert (tmp_path / "c" / "signals.parquet").read_bytes() == a
+    assert not Record(tmp_path / "d" / "signals.parquet")["mass.v"].any()
 
 
 def test_a_run_that_lacks_inputs_is_refused_before_anything_is_written(tmp_path: Path):
