@@ -1,6 +1,8 @@
 """Checks an SSP file: the system as the master takes it, then each FMU in it by itself."""
 
-from collections.abc import Iterator
+import contextlib
+import logging
+from collections.abc import Generator, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -35,13 +37,30 @@ def check_ssp(path: Path, timeout: float) -> Iterator[CheckReport]:
 
 def _system(path: Path) -> Section:
     try:
-        with SspFile(path) as ssp:
+        with _warnings() as lines, SspFile(path) as ssp:
             units, connections = len(ssp.system.units), len(ssp.system.connections)
             until = "no stop time given: a run needs --stop" if ssp.stop is None else f"until {float(ssp.stop):g} s"
             text = f"{ssp.name}, units: {units}, connections: {connections}, {until}"
-            return Section("system", text, tuple(map(warning, ssp.system.tolerated)))
+            return Section("system", text, tuple(map(warning, [*lines, *ssp.system.remarks])))
     except InvalidSsp as e:
         return Section("system", "", tuple(_finding(line) for line in e.faults))
+
+
+@contextlib.contextmanager
+def _warnings() -> Generator[list[str], None, None]:
+    """Give the warnings that are logged as an SSP is read, such as of values that nothing has."""
+    lines: list[str] = []
+
+    class Lines(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            lines.append(record.getMessage())
+
+    handler, logger = Lines(logging.WARNING), logging.getLogger(__package__)
+    logger.addHandler(handler)
+    try:
+        yield lines
+    finally:
+        logger.removeHandler(handler)
 
 
 def _finding(line: str) -> Finding:

@@ -25,6 +25,8 @@ from support.wording import Wording
 
 from handover.cosim.exceptions import InvalidSsp
 from handover.cosim.master.master import Master
+from handover.cosim.probe.finding import Level
+from handover.cosim.ssp.check_ssp import check_ssp
 from handover.cosim.ssp.ssp_file import SspFile
 from handover.cosim.system.signals import Signals
 from handover.fmus.build import build_block
@@ -140,6 +142,13 @@ def test_a_name_that_nothing_has_is_left_out_and_reported_with_the_nearest(
     assert len(caplog.records) == 4
     for record in caplog.records:
         wording.check(record.getMessage())
+
+
+def test_a_name_that_nothing_has_is_a_warning_of_a_check(tmp_path: Path):
+    fmu = decay.pack(tmp_path / "unit.fmu", b"", decay.DESCRIPTION)
+    file = pack_ssp(tmp_path / "a.ssp", described(one("nothing|Real|1")), {"resources/unit.fmu": fmu})
+    (found,) = (f for f in next(check_ssp(file, 10.0)).sections[0].findings if "'nothing'" in f.what)
+    assert found.level is Level.WARNING
 
 
 @pytest.mark.parametrize(("unit", "value"), [("[m]", 1.5), ("mm", 0.0015)])
