@@ -16,10 +16,15 @@ from rich.text import Text
 from handover.cosim.exceptions import visible
 from handover.cosim.fmu.host_process import copied
 
+_WIDTH = 160
+"""Of what is piped where COLUMNS has no number."""
+
 
 def open_console() -> Console:
     """Return a console on standard output: coloured and as wide as the terminal; piped plain, as wide as COLUMNS."""
-    return _Console(highlight=False, width=None if sys.stdout.isatty() or "COLUMNS" in os.environ else 160)
+    columns = os.environ.get("COLUMNS", "")
+    piped = int(columns) if columns.isdecimal() and int(columns) else _WIDTH
+    return _Console(highlight=False, width=None if sys.stdout.isatty() else piped)
 
 
 def print_rows(console: Console, rows: Iterable[tuple[str, ...]]) -> None:

@@ -116,6 +116,9 @@ class _PathName(click.Path):
 PATH = _PathName(path_type=Path)
 """The path of a file or folder, for options and arguments."""
 
+FILE = _PathName(dir_okay=False, path_type=Path)
+"""The path of a file."""
+
 
 class WholeNumber(click.IntRange):
     """A whole number in a range."""

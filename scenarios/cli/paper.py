@@ -15,7 +15,7 @@ from rich.text import Text
 from handover.cosim.exceptions import nearest
 from handover.scenarios.cli.campaign import CampaignOutcome, pool_config, run_campaign_command
 from handover.scenarios.cli.console import open_console
-from handover.scenarios.cli.options import SEED, HeadedCommand, campaign_options
+from handover.scenarios.cli.options import FILE, SEED, HeadedCommand, campaign_options
 from handover.scenarios.runs.execution.errors import UsageError, require_extra
 from handover.scenarios.runs.execution.progress import doing, say
 from handover.scenarios.runs.results.run_folder import InvalidRunFolder
@@ -50,7 +50,7 @@ Exit status
 @click.option("--seed", type=SEED, help="Seed of the campaign.  [default: the experiment's]")
 @click.option(
     "--model",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=FILE,
     help="vsl-2: file of a trained network of the paper's size, without which that is left out.",
 )
 @campaign_options

@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 import socket
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Coroutine, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -92,7 +92,8 @@ def play(
             folder = RunFolder(out or made.enter_context(dated_folder(RUNS, f"{Path(asked.name).stem}_play")))
             options = _options(replaced, {"--start": start, "--stop": stop, "--step": step, "--input": inputs})
             session = _session(request, asked, subject.parameters, options, folder.claim(made).shown, pace)
-        asyncio.run(_serve(session))
+            served = _serve(session, made)
+        asyncio.run(served)
 
 
 def _options(replaced: Sequence[str], others: Mapping[str, object]) -> list[str]:
@@ -120,15 +121,21 @@ def _session(
     )
 
 
-async def _serve(session: "Session") -> None:
+def _serve(session: "Session", made: contextlib.ExitStack) -> Coroutine[Any, Any, None]:
+    """Return what serves a session's page until it ends; `made` closes its port. What takes long is done before."""
     from handover.scenarios.live.page_server import ended_by_signals
     from handover.scenarios.live.play_page import PlayPage
     from handover.scenarios.live.process import HOST
     from handover.scenarios.live.server import serve
 
-    page = PlayPage(session)
-    with socket.create_server((HOST, 0)) as listening, ended_by_signals(page.end):
-        say(f"play: http://{HOST}:{listening.getsockname()[1]}/  (Ctrl-C ends the session)")
-        await serve(page, page.work(), listening)
-    runs = counted(page.runs, "run")
-    say(f"{runs} in {session.folder}" if page.runs else "no run was begun")
+    listening = made.enter_context(socket.create_server((HOST, 0)))
+
+    async def served() -> None:
+        page = PlayPage(session)
+        with ended_by_signals(page.end):
+            say(f"play: http://{HOST}:{listening.getsockname()[1]}/  (Ctrl-C ends the session)")
+            await serve(page, page.work(), listening)
+        runs = counted(page.runs, "run")
+        say(f"{runs} in {session.folder}" if page.runs else "no run was begun")
+
+    return served()

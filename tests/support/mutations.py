@@ -89,7 +89,7 @@ def is_killed(mutation: Mutation, marker: str) -> bool:
     source = path.read_bytes()
     path.write_bytes(mutation.applied(source))
     try:
-        command = [sys.executable, "-B", "-m", "pytest", "-x", "-q", "-m", marker, *tests]
+        command = [sys.executable, "-m", "pytest", "-x", "-q", "-m", marker, *tests]
         done = subprocess.run(command, cwd=ROOT, timeout=_LIMIT, capture_output=True, check=False)
     except subprocess.TimeoutExpired:
         return True

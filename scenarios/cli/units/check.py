@@ -11,7 +11,7 @@ from rich.text import Text
 
 from handover.cosim.check.check_fmu import check_fmu
 from handover.cosim.check.report import EXPERIMENTS, CheckReport, Section
-from handover.cosim.exceptions import counted
+from handover.cosim.exceptions import counted, shown_path
 from handover.cosim.files import reading_fault
 from handover.cosim.fmu.file.archive import NO_FILE_FAULT
 from handover.cosim.probe.finding import Finding, Level
@@ -139,7 +139,7 @@ def _print_indented(mark: str, text: Text, width: int) -> None:
 
 
 def _overall(reports: Sequence[CheckReport]) -> Text:
-    faulty = [r.path.name for r in reports if not r.passed]
+    faulty = [shown_path(r.path) for r in reports if not r.passed]
     if not faulty:
         return Text.assemble(("no faults", "green"), f" in all {len(reports)}")
     return Text.assemble(("faults", "bold red"), f" in {len(faulty)} of {len(reports)}: {', '.join(faulty)}")

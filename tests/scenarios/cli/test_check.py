@@ -123,7 +123,7 @@ def test_of_an_ssp_the_system_is_checked_and_then_each_unit(tmp_path: Path, outp
     assert unit["file"] == str(file / "resources/Push.fmu")
     assert unit["passed"]
     *_, overall = check(file).stdout.splitlines()
-    assert overall == ("faults in 1 of 2: x.ssp" if status else "no faults in all 2")
+    assert overall == (f"faults in 1 of 2: {file}" if status else "no faults in all 2")
 
 
 def test_the_units_of_an_unpacked_system_are_named_in_its_folder(tmp_path: Path):

@@ -1,3 +1,4 @@
+import re
 import zipfile
 from fractions import Fraction
 from pathlib import Path
@@ -6,6 +7,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from support.commands import call
+from support.rewritten_archive import described_otherwise
 
 from handover.cosim.fmu.file.description import describe_fmu
 from handover.cosim.master.master import Master
@@ -66,6 +68,14 @@ def test_enumerations_are_start_values_of_the_units_and_are_bound_nowhere(tmp_pa
     assert dict(strategy.items)["FORWARD"] == int(str(strategy.start)) != int(str(usual.parameters["strategy"].start))
     assert reflex.description.token != usual.token
     assert scene.description.token == describe_fmu(cached("GraspScene", 2)).token
+
+
+def test_what_is_presumed_of_a_system_is_said(tmp_path: Path):
+    other, file = tmp_path / "push.fmu", tmp_path / "a.ssp"
+    described_otherwise(cached("Push", 2), other, lambda text: re.sub("<DefaultExperiment[^>]*/>", "", text))
+    result = call("export", "flyer_impedance", "--ssp", file, "--unit", f"push={other}")
+    assert result.exit_code == 0, result.output
+    assert "push: its FMU proposes no communication step; 0.016 s is taken" in result.stderr
 
 
 def test_parameters_and_other_units_are_exported(tmp_path: Path):

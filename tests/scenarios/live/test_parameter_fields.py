@@ -1,11 +1,14 @@
 """The fields that `handover play` offers for parameters: their sliders, which there are, and what is said of faults."""
 
+import re
 import subprocess
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 from support.commands import call
 from support.cosim.native_units import native_fmu
+from support.rewritten_archive import described_otherwise
 
 from handover.cosim.blocks.variable import Causality, Declared, Kind
 from handover.cosim.python_process import code_command
@@ -47,18 +50,21 @@ def test_a_session_of_an_fmu_has_fields_of_its_inputs_and_gives_a_file_of_them_t
 ):
     sessions: list[Session] = []
 
-    async def serve(session: Session) -> None:
+    async def serve(session: Session, _made: ExitStack) -> None:
         sessions.append(session)
 
     monkeypatch.setattr("handover.scenarios.cli.play._serve", serve)
     file = tmp_path / "f.csv"
     file.write_text("time,f\n0,0\n1,2\n", encoding="utf-8")
-    arguments = (native_fmu("mass", 2), "-p", "k=2", "--input", file, "--start", "-1", "--out", tmp_path / "p")
+    fmu = tmp_path / "mass.fmu"
+    described_otherwise(native_fmu("mass", 2), fmu, lambda text: re.sub("<DefaultExperiment[^>]*/>", "", text))
+    arguments = (fmu, "--stop", "1", "-p", "k=2", "--input", file, "--start", "-1", "--out", tmp_path / "p")
     result = call("play", *arguments)
     assert result.exit_code == 0, result.output
+    assert "its FMU proposes no communication step; 0.004 s is taken" in result.stderr
     [session] = sessions
     assert {"m", "k", "f"} <= {*session.names}
-    assert (session.options, session.request.inputs) == (["--start", "-1", "--input", str(file)], file)
+    assert (session.options, session.request.inputs) == (["--start", "-1", "--stop", "1", "--input", str(file)], file)
     assert faults_by_name(session.first().of(session.request), session.names) == {}
     assert "last_x" in session.headline
 

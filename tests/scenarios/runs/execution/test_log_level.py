@@ -23,7 +23,7 @@ def reported(out: Path, *options: str, fmi: int = 2) -> str:
 
 
 @pytest.mark.parametrize(
-    ("level", "lines", "not_told"),
+    ("level", "lines", "unwanted"),
     [
         ("error", [], [STEP, STEPPED]),
         ("warning", [f"warning: talks: {STEP}"], [STEPPED, "categories"]),
@@ -31,10 +31,10 @@ def reported(out: Path, *options: str, fmi: int = 2) -> str:
         ("debug", [f"warning: talks: {STEP}", STEPPED, CHOSEN], []),
     ],
 )
-def test_a_level_tells_of_that_and_what_is_above(tmp_path: Path, level: str, lines: list[str], not_told: list[str]):
+def test_a_level_tells_of_that_and_what_is_above(tmp_path: Path, level: str, lines: list[str], unwanted: list[str]):
     printed = reported(tmp_path / "r", "--log-level", level)
     assert all(line in printed for line in lines), printed
-    assert not any(text in printed for text in not_told), printed
+    assert not any(text in printed for text in unwanted), printed
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
