@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from handover.cosim.stepping.options import Algorithm, MasterOptions
 from handover.cosim.system.system import System
 from handover.scenarios.api.arguments import (
+    InvalidInput,
     Seconds,
     errors_for_python,
     exact,
@@ -126,10 +127,6 @@ def run(
     return Run(task.folder.shown, task.experiment if isinstance(subject, type) else None)
 
 
-_OF_EPISODES = {"seed": "an episode's seed is given by reset(seed=3)"}
-"""Arguments of `handover.run` that an environment has not, and what is right instead."""
-
-
 def environment(
     scenario: str | type[Experiment[Any]],
     /,
@@ -166,7 +163,9 @@ def environment(
     """
     from handover.scenarios.api.environment import ScenarioEnvironment  # needs Gymnasium, an extra
 
-    with errors_for_python(named, environment, _OF_EPISODES):
+    if "seed" in named:
+        raise InvalidInput("seed: an environment has none; an episode's is given by reset(seed=3)")
+    with errors_for_python():
         check_subject(scenario)
         request = RunRequest(
             subject=scenario,

@@ -42,6 +42,12 @@ from handover.scenarios.runs.execution.file_experiment import settable_of
 from handover.scenarios.runs.execution.request import RunRequest, check_subject, experiment_type
 from handover.scenarios.runs.execution.selection import path_of_class
 
+_OF_COMMANDS = {
+    "repeat": "seeds=2 runs each point with two seeds",
+    "report": "a sweep from Python writes no page; its result's report() does",
+}
+"""Names of options that are no arguments of `sweep`, and what is right instead."""
+
 
 def sweep(
     scenario: str | Path | type[Experiment[Any]],
@@ -104,7 +110,7 @@ def sweep(
         ClusterLost: all workers were lost; runs that have ended are kept.
     """
     given = merged(parameters, named)
-    with errors_for_python(named, sweep):
+    with errors_for_python(named, sweep, _OF_COMMANDS):
         require_extra("campaigns", "campaigns")
         if workers is not None and scheduler is not None:
             raise InvalidInput("workers and scheduler: a scheduler has workers of its own; give one of them")

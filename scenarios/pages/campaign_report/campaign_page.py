@@ -176,8 +176,11 @@ def campaign_header(results: CampaignResults, claims: Sequence[Claim]) -> Markup
 
 def _scenario(results: CampaignResults) -> str:
     """Describe the scenario by what the page's title lacks: below a paper's title its name, else what it does."""
-    if results.metadata.get("experiment"):
-        return f"Runs of the scenario {results.scenario}."
+    if name := results.metadata.get("experiment"):
+        known = EXPERIMENTS.get(str(name))
+        whole = 0 if known is None else known().plan(quick=False).size
+        some = f": a quick plan, of which the whole one has {counted(whole, 'run')}" if results.planned < whole else ""
+        return f"Runs of the scenario {results.scenario}{some}."
     scenario = results.experiment
     return str(results.metadata.get("title", "" if scenario is None else scenario.title))
 

@@ -105,6 +105,8 @@ def test_an_episode_is_truncated_at_the_scenarios_end():
 
 
 def test_episodes_without_a_seed_differ_and_follow_from_the_first():
+    with pytest.raises(handover.InvalidInput, match=r"reset\(seed=3\)"):
+        handover.environment("ir_grasp", place="reflex", seed=1)
     env = handover.environment("ir_grasp", place="reflex")
     first = [env.reset(seed=1)[1]["seed"], env.reset()[1]["seed"], env.reset()[1]["seed"]]
     assert first[0] == 1

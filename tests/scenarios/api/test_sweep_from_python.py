@@ -114,6 +114,12 @@ def test_a_file_is_swept(in_process: None, tmp_path: Path):  # noqa: ARG001
     assert [float(run.metrics["max_y[3]"]) for run in campaign.runs] == [3.0, 6.0]
 
 
+def test_options_of_the_command_have_a_hint():
+    for option, right in (("repeat", "seeds=2"), ("report", r"report\(\)")):
+        with pytest.raises(handover.InvalidInput, match=right):
+            handover.sweep("ir_grasp", **dict[str, Any]({option: 1}))
+
+
 def test_texts_with_commas_are_single_values():
     with pytest.raises(handover.InvalidInput, match=r"at waypoints=a,b\.csv: .*; at waypoints=c\.csv: "):
         handover.sweep("vsl_hybrid", path="custom", waypoints=["a,b.csv", "c.csv"])

@@ -16,6 +16,7 @@ from support.wording import Wording
 from handover.scenarios.pages.campaign_report.campaign_page import write_campaign_page
 from handover.scenarios.pages.campaign_report.point_layout import layout_of
 from handover.scenarios.pages.campaign_report.spread_section import spread_section
+from handover.scenarios.published.catalog import EXPERIMENTS
 from handover.scenarios.published.published_experiment import Claim, Verdict
 from handover.scenarios.runs.campaign.table import CampaignTable
 from handover.scenarios.runs.results.run_folder import InvalidRunFolder
@@ -110,8 +111,8 @@ def test_claims_stand_with_their_verdicts(tmp_path: Path):
     claim = Claim(
         claim="it holds <more>", published="2", measured="3", verdict=Verdict.NOT_REPRODUCED, reason="3 is not 2"
     )
-    told_claims = [claim.as_data(), replace(claim, beyond=True).as_data()]
-    (tmp_path / "claims.json").write_text(json.dumps(told_claims), encoding="utf-8")
+    known = [claim.as_data(), replace(claim, beyond=True).as_data()]
+    (tmp_path / "claims.json").write_text(json.dumps(known), encoding="utf-8")
     write_campaign_page(folder)
     html = folder.report.read_text(encoding="utf-8")
     assert "it holds &lt;more&gt;" in html
@@ -123,6 +124,8 @@ def test_a_papers_campaign_of_another_version_says_what_is_left_out(tmp_path: Pa
     html = page_of(tmp_path, campaign_metadata("helix_handover", POINTS, experiment="helix-1"), table_of(POINTS))
     reported = "The campaign is of another version of helix-1, so this is left out: its runs have no tuning."
     assert reported in part_of(html, "comparison")
+    whole = EXPERIMENTS["helix-1"]().plan(quick=False).size
+    assert f"a quick plan, of which the whole one has {whole:,} runs" in html.replace("\u202f", ",")
 
 
 @pytest.mark.parametrize(
