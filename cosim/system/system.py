@@ -319,6 +319,10 @@ class System:
         self.externals.pop(end, None)
         unit = self.units[end.unit]
         self.units[end.unit] = replace(unit, start={n: x for n, x in unit.start.items() if n != end.port})
+        self._connect_last_matches()
+
+    def _connect_last_matches(self) -> None:
+        """Connect inputs whose match was taken away and that one other output matches."""
         for target, (match,) in [(t, m) for t, m in self._matches.items() if len(m) == 1]:
             if target.port not in self._sources.get(target.unit, {}):
                 self._add(match)
@@ -335,14 +339,18 @@ class System:
         for ends in (self._matches, self.followed, self.externals):
             for end in [end for end in ends if end.unit == name]:
                 del ends[end]
-        for target, matches in [*self._matches.items()]:
-            matches[:] = [c for c in matches if c.source.unit != name]
-            if not matches:
-                del self._matches[target]
+        self._matches = {
+            target: left
+            for target, matches in self._matches.items()
+            if (left := [c for c in matches if c.source.unit != name])
+        }
+        self._unsettled = [x for x in self._unsettled if x.target != name]
+        self.allow_no_match(name)
         self.connections = [c for c in self.connections if name not in (c.source.unit, c.target.unit)]
         for sources in self._sources.values():
             for port in [port for port, source in sources.items() if source.unit == name]:
                 del sources[port]
+        self._connect_last_matches()
 
     def prefer_matches(self, is_preferred: Callable[[PortName], bool]) -> dict[PortName, list[PortName]]:
         """Where several outputs match an input, leave those that are not preferred.

@@ -235,6 +235,12 @@ def test_what_is_said_of_a_unit_goes_with_it(fmu: FmuOf):
     s.remove("a")
     assert not s.externals
     s.check()
+    first, second, fed = s.add("first", fmu("Spring")), s.add("second", fmu("Spring")), s.add("fed", fmu("Mass"))
+    s.connect(first.y, fed.u)
+    s.connect(second.y, fed.u)
+    s.remove("first")
+    assert s.sources_of("fed") == {"f": second.y.f}
+    s.check()
 
 
 def test_variables_that_are_named_like_arguments_are_given_by_name(edited: Edited, wording: Wording):
