@@ -44,12 +44,12 @@ _OF_CAMPAIGNS = ("cli.paper", "cli.campaign", "published.catalog", "runs.campaig
 
 _POINTS: Mapping[str, Sequence[int]] = {
     "flyer-approaches": range(0, 500, 50),
-    "flyer-controllers": (*range(0, 24, 2), 74, 78),
+    "flyer-controllers": range(0, 24, 2),
     "flyer-handover": (0, 3, 6, 9, 18, 21),
     "flyer-impedance": range(12),
     "flyer-navigation": (0, 2, 32, 36, 40, 84, 88, 92),
     "flyer-stability": range(30, 45, 3),
-    "flyer-study": (*range(0, 8, 2), 20, 21, 28, 29, 50, 51, 58, 59, 80, 81, 88, 89),
+    "flyer-study": (20, 28),
     "helix-1": (8,),
     "helix-2": (5, 9),
     "helix-3": (4,),

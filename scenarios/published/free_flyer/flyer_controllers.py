@@ -122,7 +122,7 @@ class FlyerControllers(PublishedExperiment):
         panels = [_panel(found, p, *what) for what in shown for p in PROPULSIONS]
         caption = (
             "How far the gripper goes at most while the robot yields, and the greatest force on the hand in a "
-            "transfer, by what takes the place of the impedance control; means of the runs."
+            "transfer. Bars are means of the runs with each of the controllers."
         )
         return drawn(folder / "controllers", caption, panels, 2, size=(9.0, 5.6))
 
