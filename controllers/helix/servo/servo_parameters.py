@@ -260,8 +260,7 @@ class Params:
     )
     standoff: Metre = parameter(
         0.10,
-        "distance beside the ball at which a gripper that is too low goes up before it comes over it; 0: straight to "
-        "the goal (own; thesis: 0)",
+        "distance beside the ball at which a gripper that is too low rises before it comes over it; 0: never (own)",
         minimum=0.0,
         maximum=0.3,
         origin=assumed("open fingers reach 5 cm from the gripper's axis, the ball 2.5 cm from its middle"),

@@ -6,9 +6,9 @@ from handover.scenarios.experiment.places import Place
 
 _BASE = (
     "W is the world: its origin is the arm's mount, z points up, x away from the cameras, y to their left. B is the "
-    "arm's base frame, with z down along the hanging arm: R_WB = diag(1, -1, -1). z of the ring R points along "
-    "the arm, away from the mount, z of the gripper G to its tip. Vectors are in W where nothing else is said. "
-    "Quaternions are scalar first, of the frame's orientation in W."
+    "arm's base frame, with z down along the hanging arm: R_WB = diag(1, -1, -1). The ring's frame R has z along "
+    "the arm, away from the mount, and the gripper's frame G has z towards its tip. Vectors are in W where nothing "
+    "else is said. Quaternions are scalar first, of the frame's orientation in W."
 )
 _CALIBRATION = {
     f"{what}_{side}": ""

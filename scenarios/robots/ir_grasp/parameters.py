@@ -86,8 +86,8 @@ class Parameters:
         "folder of an earlier run, whose estimated Jacobian correction=fast begins with; empty: the hand's design",
         origin=assumed(
             "own. Over 40 scenes it changes neither how many it grasps, 40 of 40, nor much the median time of "
-            "refinement, 3.8 s without and 3.9 s with it: the eight things but thing=drawn, each at seeds 777001 to "
-            "777005, after its grasp at 777000. Sensors say soon enough what the design leaves open"
+            "refinement, 3.8 s without and 3.9 s with it. These are the eight things but thing=drawn, each at seeds "
+            "777001 to 777005, after its grasp at 777000. Sensors say soon enough what the design leaves open"
         ),
         needs=(being("correction", Correction.FAST),),
     )
