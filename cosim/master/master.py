@@ -5,7 +5,6 @@ import logging
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from numbers import Rational
-from operator import is_not
 from pathlib import Path
 from types import TracebackType
 from typing import TypeVar
@@ -22,6 +21,7 @@ from handover.cosim.exceptions import (
 from handover.cosim.fmu.calls import is_rounding
 from handover.cosim.fmu.failures import UnitCrashed, UnitHung, UnitTerminated
 from handover.cosim.fmu.file.archive import DESCRIPTION
+from handover.cosim.fmu.file.default_experiment import exact_text
 from handover.cosim.fmu.heartbeat import Abandoned, Heartbeat
 from handover.cosim.fmu.host_process import mark_as_host
 from handover.cosim.fmu.unit_warnings import UnitWarnings
@@ -90,7 +90,7 @@ _MOST_STEPS = 10**12
 
 def _check_exact(stop: Fraction) -> None:
     if not isinstance(stop, Rational):  # type: ignore
-        raise TypeError(f"stop = {stop!r} is not exact; give Fraction('{stop!r}')")
+        raise TypeError(f"stop = {stop!r} is not exact; give {exact_text(stop)}")
 
 
 def _check_steps(schedule: Schedule, stop: Fraction) -> None:
@@ -100,9 +100,10 @@ def _check_steps(schedule: Schedule, stop: Fraction) -> None:
         raise ScheduleError(f"until the stop time {float(stop):g} s there are {many}, too many to do")
 
 
-def _parts(system: System) -> list[object]:
-    """Return all that a system is made of, in order."""
-    return [*system.units.values(), *system.connections, *system.followed.values(), *system.externals.values()]
+def _parts(system: System) -> list[tuple[object, object]]:
+    """Return all that a system is made of, in order: of each part a key, and an object by identity."""
+    named = (*system.units.items(), *system.followed.items(), *system.externals.items())
+    return [(system.start, None), *((None, c) for c in system.connections), *named]
 
 
 class Master:
@@ -165,7 +166,10 @@ class Master:
     def __enter__(self) -> "Master":
         if self._ensemble is not None and not self._is_left:
             raise RuntimeError("the master is entered already: leave it first, or make another one")
-        if len(now := _parts(self.system)) != len(self._parts) or any(map(is_not, now, self._parts)):
+        now = _parts(self.system)
+        if len(now) != len(self._parts) or any(
+            a != b or x is not y for (a, x), (b, y) in zip(now, self._parts, strict=True)
+        ):
             raise RuntimeError(
                 "the system was changed after this master checked it: make the master once it is complete"
             )

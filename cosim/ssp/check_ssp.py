@@ -56,11 +56,15 @@ def _warnings() -> Generator[list[str], None, None]:
             lines.append(record.getMessage())
 
     handler, logger = Lines(logging.WARNING), logging.getLogger(__package__)
+    level, logger.propagate = logger.level, False
+    logger.setLevel(logging.WARNING)
     logger.addHandler(handler)
     try:
         yield lines
     finally:
         logger.removeHandler(handler)
+        logger.propagate = True
+        logger.setLevel(level)
 
 
 def _finding(line: str) -> Finding:

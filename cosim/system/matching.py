@@ -65,11 +65,13 @@ class TerminalFault:
     """Terminals that belong together and cannot be connected.
 
     Attributes:
+        source: the unit that feeds.
         target: the unit that is fed.
         reason: which terminals these are, and why.
         inputs: the terminal's inputs; none where the terminal itself is at fault, so that they are not known.
     """
 
+    source: str
     target: str
     reason: str
     inputs: tuple[str, ...] = ()
@@ -201,7 +203,7 @@ class _TerminalMatching:
         """Return what matches."""
         for unit, d in ((self._source, self._a), (self._target, self._b)):
             if d.terminals.fault:
-                self._matches.faults.append(TerminalFault(self._target, f"{unit}: {d.terminals.fault}"))
+                self._matches.faults.append(TerminalFault(self._source, self._target, f"{unit}: {d.terminals.fault}"))
         self._match_names()
         self._match_kinds()
         return self._matches
@@ -220,7 +222,7 @@ class _TerminalMatching:
                 if is_faulty or a.kind == b.kind:
                     reason = f"{self._source}.{name} -> {self._target}.{name}: terminals that do not match: {e}"
                     inputs = _ports_in(b, self._b.inputs)
-                    self._matches.faults.append(TerminalFault(self._target, reason, inputs))
+                    self._matches.faults.append(TerminalFault(self._source, self._target, reason, inputs))
                     self._leave(b, f"{self._source}.{name} does not match it")
                 self._given.pop(name, None)
                 self._fed.pop(name, None)

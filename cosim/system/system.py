@@ -22,6 +22,7 @@ from handover.cosim.fmu.file.default_experiment import (
     NO_STEP,
     DefaultExperiment,
     NoStep,
+    exact_text,
     presumed_step,
     proposed_step,
 )
@@ -85,6 +86,7 @@ class System:
         self.notes: list[str] = []
         """Lines to show before it is run or exported, such as connections and values that its units need not have."""
         self._faults: list[str] = []
+        self._name_faults: dict[str, str] = {}  # by unit
         self._step_faults: dict[str, NoStep] = {}  # by unit that has no communication step
         self._presumed_steps: dict[str, str] = {}  # by unit, what its step was taken from
         self._tolerated: list[str] = []
@@ -130,9 +132,9 @@ class System:
             raise TypeError(f"unit {name}: {', '.join(twice)} stands in start and besides it: give one value")
         description = fmu if isinstance(fmu, FmuDescription) else self._described(Path(fmu))
         if not re.fullmatch(UNIT_NAME, name):
-            self._faults.append(f"a unit is called {name!r:.60}: expected a name that is seen, in one line")
+            self._name_faults[name] = f"a unit is called {name!r:.60}: expected a name that is seen, in one line"
         if name in self.units:
-            self._faults.append(f"two units are called {name!r}")
+            self._name_faults[name] = f"two units are called {name!r}"
         period = self._period(name, description.experiment, period)
         is_sampled = description.sampled if sampled is None else sampled
         unit = PlacedUnit(name, description, {**(start or {}), **values}, period, is_sampled, self._number)
@@ -334,7 +336,7 @@ class System:
             KeyError: there is no such unit.
         """
         del self.units[name]
-        for table in (self._sources, self._step_faults, self._presumed_steps):
+        for table in (self._sources, self._name_faults, self._step_faults, self._presumed_steps):
             table.pop(name, None)
         for ends in (self._matches, self.followed, self.externals):
             for end in [end for end in ends if end.unit == name]:
@@ -344,7 +346,7 @@ class System:
             for target, matches in self._matches.items()
             if (left := [c for c in matches if c.source.unit != name])
         }
-        self._unsettled = [x for x in self._unsettled if x.target != name]
+        self._unsettled = [x for x in self._unsettled if name not in (x.source, x.target)]
         self.allow_no_match(name)
         self.connections = [c for c in self.connections if name not in (c.source.unit, c.target.unit)]
         for sources in self._sources.values():
@@ -427,6 +429,7 @@ class System:
             WiringError: with every fault of the system.
         """
         faults = [
+            *self._name_faults.values(),
             *self._faults,
             *self._step_faults.values(),
             *self._unmatched.values(),
@@ -436,7 +439,7 @@ class System:
         faults += [f"two outputs are called {name}: call a unit otherwise" for name, n in outputs.items() if n > 1]
         faults += [ambiguity(to, [c.source for c in cs]) for to, cs in self._matches.items() if len(cs) > 1]
         if not isinstance(self.start, Rational):  # type: ignore
-            faults.append(f"its start, {self.start!r}, is not exact; give Fraction('{self.start!r}')")
+            faults.append(f"its start, {self.start!r}, is not exact; give {exact_text(self.start)}")
         for unit in self.units.values():
             faults += value_faults(unit.name, unit.description, unit.start)
             faults += event_faults(unit.name, unit.description, unit.sampled)
@@ -534,8 +537,7 @@ class System:
 
     def _period(self, name: str, proposed: DefaultExperiment, period: Fraction | None) -> Fraction:
         if period is not None and not isinstance(period, Rational):  # type: ignore
-            exact = Fraction(str(period)) if isinstance(period, float) else "1/100"
-            right = f"give Fraction('{exact}'){_as_value('period')}"
+            right = f"give {exact_text(period)}{_as_value('period')}"
             raise TypeError(f"{name}: period = {period!r} is not exact, so time would drift; {right}")
         self._step_faults.pop(name, None)
         self._presumed_steps.pop(name, None)

@@ -71,8 +71,9 @@ class TimeSeries:
             return "its values are held: it does not vary continuously"
         if port.kind is Kind.REAL and self.unit and port.unit.symbol not in ("", self.unit):
             return f"values in {self.unit} where {port.unit} is right"
-        if port.kind is Kind.REAL and len(self.values) > 2:  # what is between the least and the most is in range, too
-            rows = np.stack((self.values.min(axis=0), self.values.max(axis=0)))
+        broken = self.values[(self.values != np.round(self.values)).any(axis=1)] if port.kind is not Kind.REAL else ()
+        if port.kind in (Kind.REAL, Kind.INTEGER):  # what is between the least and the most is in range, too
+            rows = [*broken[:1], self.values.min(axis=0), self.values.max(axis=0)]
         else:
             rows = np.unique(self.values, axis=0)
         return next((fault for row in rows if (fault := entries_fault(port, row))), None)
@@ -102,12 +103,12 @@ class HeldValue(TimeSeries):
         Raises:
             ValueError: these are others, not finite, or not of the type of the first.
         """
-        given = np.asarray(entries)
-        typed = given.astype(self.values.dtype)
-        if typed.shape != self.entries.shape or not ((typed == given) & np.isfinite(typed)).all():
-            right = f"{counted(len(self.entries), 'finite number')} of type {typed.dtype}"
+        given, kind = np.asarray(entries), self.values.dtype
+        fits = given.shape == self.entries.shape and given.dtype.kind in ("b" if kind == np.bool_ else "iuf")
+        if not (fits and np.isfinite(given).all() and (given.astype(kind) == given).all()):
+            right = f"{counted(len(self.entries), 'finite number')} of type {kind}"
             raise ValueError(f"{short_repr(given)} cannot be held here: expected {right}")
-        self.values[0] = typed
+        self.values[0] = given
 
 
 class ExternalSource(Protocol):

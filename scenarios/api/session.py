@@ -22,6 +22,7 @@ from handover.cosim.master.master import Master
 from handover.cosim.stepping.options import Algorithm, MasterOptions
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PortName, System
+from handover.cosim.system.time_series import HeldValue
 from handover.scenarios.api.arguments import (
     InvalidInput,
     Seconds,
@@ -430,6 +431,8 @@ def _settings(experiment: Experiment[Any], parameters: Any, system: System) -> d
     wiring = {
         f"what feeds {c.target}": f"{c.source}{f' {t}' if (t := c.transformation) else ''}" for c in system.connections
     }
+    given_over_time = [end for end, series in system.followed.items() if not isinstance(series, HeldValue)]
+    wiring |= {f"what feeds {end}": "values over time" for end in (*given_over_time, *system.externals)}
     return {v.name: text_of(v, getattr(parameters, v.name)) for v in experiment.parameters()} | fmus | of_units | wiring
 
 

@@ -25,7 +25,7 @@ from handover.cosim.blocks.variable import Causality, Variable
 from handover.cosim.record.reader import Record
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PlacedUnit, System
-from handover.scenarios.experiment.exposed import carry, check_exposed, notes_without_effect, with_exposed
+from handover.scenarios.experiment.exposed import carry, check_exposed, notes_on_exposed, with_exposed
 from handover.scenarios.experiment.live_inputs import HandHint, LedHand, Pushable
 from handover.scenarios.experiment.needs import needs_of
 from handover.scenarios.experiment.paper import PublishedValue
@@ -272,7 +272,7 @@ class Experiment(abc.ABC, Generic[AnyEvaluator]):
         sample_in_places(system, self.units)
         path = f"{type(self).__module__}:{type(self).__qualname__}"
         fit_places(system, self.places, self.units, self.name if path.startswith("handover.") else path)
-        system.notes += notes_without_effect(parameters, system)
+        system.notes += notes_on_exposed(parameters, system)
         return system
 
     def check_unit_values(self, system: System, given: Sequence[str]) -> None:

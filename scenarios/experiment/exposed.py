@@ -109,7 +109,7 @@ def carry(parameters: Any, system: System) -> System:
     return system
 
 
-def notes_without_effect(parameters: Any, system: System) -> list[str]:
+def notes_on_exposed(parameters: Any, system: System) -> list[str]:
     """Return a line for each exposed parameter that is not at its default and that none of its units has."""
     if not is_dataclass(parameters):
         return []
@@ -119,7 +119,7 @@ def notes_without_effect(parameters: Any, system: System) -> list[str]:
         if unit in system.units:
             of_units.setdefault(own, []).append((system.units[unit], name))
     return [
-        f"{own}: it has no effect, as {' and '.join(f'{u.name} ({u.description.name}) has no {n}' for u, n in ends)}"
+        f"{own}: {' and '.join(f'{u.name} ({u.description.name}) has no {n}' for u, n in ends)}, so it is not set there"
         for own, ends in of_units.items()
         if not any(name in unit.description.settable for unit, name in ends)
         if not np.array_equal(getattr(parameters, own), declared[own].start)

@@ -110,9 +110,9 @@ def sample_in_places(system: System, units: Mapping[str, str]) -> None:
     for name in units.keys() & system.units.keys():
         placed, own = system.units[name], find_unit(units[name])
         d = placed.description
-        if d.name == own.name or not placed.sampled:
-            continue
         period = proposed_step(d.step)
+        if not placed.sampled or (not d.sampled and d.name == own.name):
+            continue
         if not d.sampled:
             line = f"has no sampling period of its own: it is called every {float(placed.period):g} s"
         elif period and period != import_class(own.block).period and (period / placed.period).denominator != 1:

@@ -88,6 +88,14 @@ def proposed_step(step: float | None) -> Fraction | None:
     return Fraction(repr(step))
 
 
+def exact_text(seconds: object) -> str:
+    """Return how a time that is no fraction is written as one, `Fraction('7/100')`; an example where it is no time."""
+    try:
+        return f"Fraction('{Fraction(str(seconds))}')"
+    except (ValueError, ZeroDivisionError):
+        return "a fraction, such as Fraction('1/100')"
+
+
 def presumed_step(duration: float | Fraction) -> Fraction | None:
     """Return a 500th of a duration in seconds, to one significant digit; None where that is not a step."""
     if duration > sys.float_info.max:

@@ -26,7 +26,12 @@ from handover.scenarios.runs.execution.interruption import Interruption
 from handover.scenarios.runs.execution.resumption import Resumption, pack
 from handover.scenarios.runs.execution.supervisor import heartbeat_of_run, is_supervised
 from handover.scenarios.runs.execution.unit_values import built_system, settings_behind
-from handover.scenarios.runs.results.output_faults import NotFiniteData, outputs_not_finite, outputs_out_of_range
+from handover.scenarios.runs.results.output_faults import (
+    NotFiniteData,
+    OutOfRangeData,
+    outputs_not_finite,
+    outputs_out_of_range,
+)
 from handover.scenarios.runs.results.pictures import write_picture_files
 from handover.scenarios.runs.results.run_facts import record_of
 from handover.scenarios.runs.results.run_folder import disk_errors_reported
@@ -119,7 +124,8 @@ def run_task(
         master.pacer = ControlledPacer(control)
     if resumption is None:
         master.heartbeat.record_scratch_folder(str(task.folder.path))  # if it crashes before the folder is begun
-    began, not_finite, out_of_range, recorded = False, list[NotFiniteData](), list[str](), dict[str, Metric]()
+    began, recorded = False, dict[str, Metric]()
+    not_finite, out_of_range = list[NotFiniteData](), list[OutOfRangeData]()
     try:
         with master:
             if resumption is not None:
@@ -233,7 +239,7 @@ class _Ended:
     failure: UnitFailure | None
     interrupted: bool
     not_finite: Sequence[NotFiniteData]
-    out_of_range: Sequence[str]
+    out_of_range: Sequence[OutOfRangeData]
     recorded: Mapping[str, Metric]
     spent: ElapsedTime
 

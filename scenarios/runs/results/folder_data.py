@@ -11,7 +11,7 @@ from typing_extensions import NotRequired, TypedDict
 from handover.cosim.fmu.unit_warnings import WarningData
 from handover.cosim.stepping.options import Algorithm
 from handover.cosim.typed_data import Count, ExactSeconds, ExactTime, FilePath, NotNegative, PortName, Seed
-from handover.scenarios.runs.results.output_faults import NotFiniteData
+from handover.scenarios.runs.results.output_faults import NotFiniteData, OutOfRangeData
 
 
 class AdaptiveData(TypedDict):
@@ -114,7 +114,7 @@ class _OfSomeSummaries(TypedDict, total=False):
     ended: FailureData
     warnings: list[WarningData]
     not_finite: list[NotFiniteData]
-    out_of_range: list[str]
+    out_of_range: list[OutOfRangeData]
     left_out: list[str]
 
 
@@ -123,8 +123,8 @@ class Summary(_OfSomeSummaries):
 
     Runs with adaptive steps have `steps`; those paced by real time `pace`; those that a unit ended its request in
     `ended`. `warnings` has the calls that answered Warning, by unit, and `not_finite` the outputs that are NaN or
-    infinite in the record, where there are any; `out_of_range` a line on each of those that are beyond what their FMUs
-    declare. `left_out` says, a line each, which figures, pictures or parts of the
+    infinite in the record, where there are any; `out_of_range` has those beyond the ranges that their
+    FMUs declare. `left_out` says, a line each, which figures, pictures or parts of the
     report could not be made. Of `Configuration` it has all.
     """
 

@@ -1,9 +1,11 @@
 """Outputs of a run that are NaN, infinite or out of their range in its record: which, from when on, and lines on them.
 
 The master checks what feeds a unit, and a value that is not finite there ends the run. What feeds no unit harms none of
-them: the run goes on, and they are reported at its end. So are outputs beyond the range that their FMU declares.
+them: the run goes on, and they are reported at its end. So are numeric outputs beyond the ranges that their FMUs
+declare.
 """
 
+import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypedDict
@@ -20,8 +22,8 @@ MAX_LINES = 5
 """Outputs that are reported in a line each; of more there is the number."""
 
 
-_ROUNDING = 1e-9
-"""By how much of its limit an output may be beyond it."""
+_ROUNDING, _LEAST_SLACK = 1e-6, 1e-12
+"""By how much of its limits an output may be beyond one, as numbers of 32 bits are, and by how much at least."""
 
 
 class NotFiniteData(TypedDict):
@@ -39,6 +41,20 @@ class NotFiniteData(TypedDict):
     value: str
     time: float
     feeds: bool
+
+
+class OutOfRangeData(TypedDict):
+    """An output that left its range, named as of `NotFiniteData`, with its first such value and the time, s.
+
+    Of an array it is the entry that left first.
+    """
+
+    instance: str
+    output: str
+    index: str
+    value: float
+    time: float
+    range: str
 
 
 def outputs_not_finite(signals: Path, system: System) -> list[NotFiniteData]:
@@ -65,33 +81,33 @@ def outputs_not_finite(signals: Path, system: System) -> list[NotFiniteData]:
     return list(found.values())
 
 
-def outputs_out_of_range(signals: Path, system: System) -> list[str]:
-    """Return a line for each entry of an output that left its declared range in the record of a run, with the time.
-
-    Of many there are the first few lines, and one that says how many more there are.
-    """
+def outputs_out_of_range(signals: Path, system: System) -> list[OutOfRangeData]:
+    """Return the numeric outputs of a system that leave their declared ranges somewhere in the record of its run."""
     bounded = {
-        f"{unit.name}.{entry}": port
+        f"{unit.name}.{entry}": (unit.name, port)
         for unit in system.units.values()
         for port in unit.description.outputs.values()
-        if port.kind is Kind.REAL and (port.minimum, port.maximum) != (None, None)
+        if port.kind in (Kind.REAL, Kind.INTEGER) and (port.minimum, port.maximum) != (None, None)
         for entry in element_names(port)
     }
 
     def leaves(name: str, values: NDArray[Any]) -> NDArray[Any]:
-        low, high = bounded[name].minimum, bounded[name].maximum
-        below = low is not None and values < low - _ROUNDING * abs(low)
-        above = high is not None and values > high + _ROUNDING * abs(high)
-        return np.logical_or(below, above)
+        _, port = bounded[name]
+        low = -math.inf if port.minimum is None else port.minimum
+        high = math.inf if port.maximum is None else port.maximum
+        slack = max([_LEAST_SLACK, *(_ROUNDING * abs(x) for x in (low, high) if math.isfinite(x))])
+        return np.isfinite(values) & ((values < low - slack) | (values > high + slack))
 
-    found = _first(signals, bounded, leaves) if bounded and signals.exists() else ()
-    lines = [
-        f"{name} = {value:g} at t = {time:.6g} s, beyond its range, {range_of(bounded[name])}"
-        for name, time, value in found
-    ]
-    if (more := len(lines) - MAX_LINES) > 0:
-        lines[MAX_LINES:] = [f"{counted(more, 'more output goes', 'more outputs go')} beyond the declared range"]
-    return lines
+    found: dict[tuple[str, str], OutOfRangeData] = {}
+    for name, time, value in _first(signals, bounded, leaves) if bounded and signals.exists() else ():
+        unit, port = bounded[name]
+        index = name.removeprefix(f"{unit}.{port.name}")
+        first = OutOfRangeData(
+            instance=unit, output=port.name, index=index, value=value, time=time, range=range_of(port)
+        )  # fmt: skip
+        if (unit, port.name) not in found or time < found[unit, port.name]["time"]:
+            found[unit, port.name] = first
+    return list(found.values())
 
 
 def _ends(name: str, system: System) -> tuple[str, str]:
@@ -104,9 +120,9 @@ def _ends(name: str, system: System) -> tuple[str, str]:
 def _first(
     signals: Path, names: Collection[str] | None, is_wrong: Callable[[str, NDArray[Any]], NDArray[Any]]
 ) -> Iterator[tuple[str, float, float]]:
-    """Yield each column of real numbers that is wrong somewhere, with the time of the first such value, and the value.
+    """Yield each column that is wrong somewhere, with the time of the first such value, and the value.
 
-    `names` are those that are looked at, None for all.
+    `names` are those that are looked at, None for all of real numbers.
     """
     import pyarrow as pa  # slow to import
     import pyarrow.parquet as pq
@@ -118,7 +134,7 @@ def _first(
     real = [
         name
         for name, kind in zip(schema.names, schema.types, strict=True)
-        if kind == pa.float64() and (names is None or name in names or name == "time")
+        if name == "time" or (kind == pa.float64() if names is None else name in names)
     ]
     first: dict[str, tuple[float, float]] = {}
     for batch in file.iter_batches(columns=real, use_threads=False):
@@ -147,6 +163,19 @@ def not_finite_lines(outputs: Sequence[Mapping[str, Any]]) -> list[str]:
     if more > 0:
         which = counted(more, "more output is", "more outputs are")
         lines.append(f'{which} not finite: summary.json has them all, by "not_finite"')
+    return lines
+
+
+def out_of_range_lines(outputs: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return a line for each output that left its range; of many, for the first few, and how many more there are."""
+    lines = [
+        f"unit {o['instance']}: {o['output']}{o['index']} = {o['value']:g} at t = {o['time']:.6g} s, beyond its range, "
+        f"{o['range']}"
+        for o in outputs[:MAX_LINES]
+    ]
+    if (more := len(outputs) - MAX_LINES) > 0:
+        which = counted(more, "more output goes", "more outputs go")
+        lines.append(f'{which} beyond the declared range: summary.json has them all, by "out_of_range"')
     return lines
 
 

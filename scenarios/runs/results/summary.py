@@ -30,7 +30,7 @@ from handover.fmus.contents.icons import catalog_icon
 from handover.scenarios.experiment.display_unit import unit_symbol
 from handover.scenarios.experiment.experiment import Experiment, Metric, Outcome
 from handover.scenarios.runs.results.folder_data import Configuration, MetricData, UnitData
-from handover.scenarios.runs.results.output_faults import NotFiniteData
+from handover.scenarios.runs.results.output_faults import NotFiniteData, OutOfRangeData
 from handover.scenarios.runs.results.run_folder import hashes_of_files, sha256_of, versions
 from handover.scenarios.runs.results.tables import conversions_of, format_value
 from handover.scenarios.runs.results.task import Task
@@ -176,7 +176,7 @@ def configuration(task: Task) -> dict[str, Any]:
 
 def finished_summary(
     task: Task, outcome: Outcome, master: Master, spent: ElapsedTime, failure: UnitFailure | None, complete: bool,
-    not_finite: Sequence[NotFiniteData] = (), out_of_range: Sequence[str] = (),
+    not_finite: Sequence[NotFiniteData] = (), out_of_range: Sequence[OutOfRangeData] = (),
 ) -> dict[str, Any]:  # fmt: skip
     """Return the summary of a run that came to its end, failed, or was interrupted."""
     metrics = {**outcome.metrics, **_run_metrics(task.experiment, master)}

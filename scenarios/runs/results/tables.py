@@ -13,7 +13,7 @@ from handover.cosim.stepping.options import Algorithm
 from handover.cosim.system.conversion import LinearTransformation
 from handover.cosim.system.system import System
 from handover.scenarios.experiment.display_unit import display_unit
-from handover.scenarios.runs.results.output_faults import not_finite_lines
+from handover.scenarios.runs.results.output_faults import not_finite_lines, out_of_range_lines
 
 
 def master_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -59,7 +59,11 @@ def warning_lines(summary: Mapping[str, Any]) -> list[str]:
     These are the units of which calls answered Warning, then outputs that were not finite, or beyond their ranges.
     """
     warned = [_warning_line(warned) for warned in summary.get("warnings", [])]
-    return [*warned, *not_finite_lines(summary.get("not_finite", [])), *summary.get("out_of_range", [])]
+    return [
+        *warned,
+        *not_finite_lines(summary.get("not_finite", [])),
+        *out_of_range_lines(summary.get("out_of_range", [])),
+    ]
 
 
 def _warning_line(warned: Mapping[str, Any]) -> str:

@@ -1,6 +1,8 @@
+import math
 from fractions import Fraction
 from pathlib import Path
 
+import numpy as np
 import pytest
 from support.cosim.fmu_of import FmuOf
 from support.cosim.observed_rows import observed_rows
@@ -13,6 +15,7 @@ from handover.cosim.record.recorder import Recorder
 from handover.cosim.stepping.options import Algorithm, MasterOptions
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System
+from handover.cosim.system.time_series import TimeSeries
 
 
 @pytest.mark.parametrize(
@@ -81,14 +84,23 @@ def test_a_run_ends_when_an_observer_ends_it(fmu: FmuOf):
 def test_stops_are_exact_and_a_system_that_was_changed_since_is_not_loaded(fmu: FmuOf):
     s = System()
     s.add("counter", fmu("Counter"))
-    with pytest.raises(TypeError, match=r"Fraction\('0.07'\)"):
-        Master(s, stop=0.07)  # type: ignore
-    with Master(s) as master, pytest.raises(TypeError, match=r"Fraction\('0.07'\)"):
+    for stop, right in ((0.07, "'7/100'"), (np.float64(0.07), "'7/100'"), (math.inf, "'1/100'")):
+        with pytest.raises(TypeError, match=rf"give .*Fraction\({right}\)"):
+            Master(s, stop=stop)  # type: ignore
+    with Master(s) as master, pytest.raises(TypeError, match="7/100"):
         master.run(0.07)  # type: ignore
-    late = Master(s)
-    s.add("mass", fmu("Mass"))
-    with pytest.raises(RuntimeError, match="was changed"):
-        late.__enter__()
+    series = TimeSeries([0.0], [[0.0]], linear=False)
+    a, b = s.add("a", fmu("Mass")), s.add("b", fmu("Mass"))
+    for change in (
+        lambda: s.add("mass", fmu("Mass")),
+        lambda: s.follow(a.u.f, series),
+        lambda: (s.followed.clear(), s.follow(b.u.f, series)),
+        lambda: setattr(s, "start", Fraction(1)),
+    ):
+        late = Master(s)
+        change()
+        with pytest.raises(RuntimeError, match="was changed"):
+            late.__enter__()
 
 
 def test_a_unit_that_refuses_its_parameters_is_named_with_its_reason(fmu: FmuOf):

@@ -165,6 +165,7 @@ WHOLE: dict[str, Any] = {"kind": Kind.INTEGER, "fmi_type": "Int32", "width": Wid
     [
         (WHOLE, [[0.7]], None),
         (WHOLE, [[0], [2**40]], None),
+        (WHOLE, [[0.0], [0.5], [1.0]], None),
         ({"kind": Kind.BOOLEAN, "fmi_type": "Boolean"}, [[1], [2]], None),
         ({"kind": Kind.ENUMERATION, "fmi_type": "Int64", "items": (("A", 1), ("B", 2))}, [[1], [2], [3]], None),
         ({"maximum": 10.0}, [[0.0], [11.0], [0.0]], None),
@@ -192,9 +193,10 @@ def test_a_held_value_is_set_to_what_it_can_hold():
     held = HeldValue([1])
     held.set([2.0])
     assert held.entries.tolist() == [2]
-    for wrong in ([0.5], [np.nan], [1, 2]):
-        with pytest.raises(ValueError, match="cannot be held here"):
-            held.set(wrong)
+    for other, wrong in ((held, [[0.5], [np.nan], [1, 2], [2**70], ["x"]]), (HeldValue([1.0]), [[True]])):
+        for value in wrong:
+            with pytest.raises(ValueError, match="cannot be held here"):
+                other.set(value)
     assert held.entries.tolist() == [2]
 
 

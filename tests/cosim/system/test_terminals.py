@@ -151,6 +151,17 @@ def test_two_named_terminals_are_connected_refused_and_disconnected_as_a_whole(b
         bench.system.connect(a.y.tip, b.u.palm, LinearTransformation(2.0))
 
 
+@pytest.mark.parametrize("gone", ["robot", "scene"])
+def test_what_is_ambiguous_or_at_fault_ends_with_either_of_its_units(bench: Bench, gone: str):
+    a = bench.giver("robot", {"x": "m"}, named("tip", p="x"))
+    b = bench.taker("scene", {"z": "m", "w": "m"}, named("first", p="z"), named("second", p="w"))
+    bench.system.connect(a.y, b.u)
+    with pytest.raises(WiringError):
+        bench.system.check()
+    bench.system.remove(gone)
+    bench.system.check()
+
+
 def test_a_single_connection_takes_precedence_over_a_terminal_before_and_after(bench: Bench):
     a, other = bench.giver("arm", POSE, TIP), bench.giver("other", POSE)
     b = bench.taker("hand", POSE, TIP)

@@ -15,6 +15,7 @@ from support.wording import Wording
 
 import handover
 from handover.cosim.ssp.writing import write_ssp
+from handover.cosim.system.time_series import TimeSeries
 from handover.scenarios.runs.execution.file_experiment import UntilStop
 
 
@@ -163,7 +164,13 @@ def test_a_state_of_other_wiring_or_of_another_fmu_is_refused():
     with handover.open(chain("a")) as s:
         state = s.save()
         s.restore(state)
-    for other, named in ((chain("b"), "last.u was a.y and is b.y"), (chain("a", 2), "the FMU of a was ")):
+    followed = chain("a")
+    followed.follow(followed.units["a"].u.u, TimeSeries([0.0], [[3.0]], linear=False))
+    for other, named in (
+        (chain("b"), "last.u was a.y and is b.y"),
+        (chain("a", 2), "the FMU of a was "),
+        (followed, "what feeds a.u was as usual and is values over time"),
+    ):
         with handover.open(other) as s, pytest.raises(handover.InvalidInput) as refused:
             s.restore(state)
         assert named in str(refused.value)

@@ -21,7 +21,7 @@ from handover.fmus.build import cached
 from handover.fmus.catalog import find_unit
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.experiment.experiment import Experiment
-from handover.scenarios.experiment.exposed import notes_without_effect
+from handover.scenarios.experiment.exposed import notes_on_exposed
 from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.experiment.places import ports_of_place, sample_in_places
 
@@ -137,12 +137,15 @@ def test_a_sampled_unit_in_the_place_of_another_keeps_its_period():
     sample_in_places(s, {"servo": "VisualServo", "camera": "StereoCamera"})
     assert {u.period for u in s.units.values()} == {Fraction(1, 10)}
     assert ["no sampling period of its own" in note for note in s.notes] == [True]
+    s.add("same", replace(own, name="VisualServo", step=0.25), period=Fraction(1, 10))  # the name is no proof
+    sample_in_places(s, {"same": "VisualServo"})
+    assert s.units["same"].period == Fraction(1, 4)
 
 
-def test_a_parameter_that_only_a_replaced_unit_has_is_said_to_have_no_effect():
+def test_a_parameter_that_only_a_replaced_unit_has_is_noted():
     scenario, s = SCENARIOS["helix_handover"], System()
     s.add("servo", replace(describe_fmu(native_fmu("gain", 3)), name="Own"))
-    assert notes_without_effect(parse_parameters(scenario, ["alpha=0.123"]), s) == [
-        "alpha: it has no effect, as servo (Own) has no alpha"
+    assert notes_on_exposed(parse_parameters(scenario, ["alpha=0.123"]), s) == [
+        "alpha: servo (Own) has no alpha, so it is not set there"
     ]
-    assert notes_without_effect(scenario.parameters_type(), s) == []
+    assert notes_on_exposed(scenario.parameters_type(), s) == []

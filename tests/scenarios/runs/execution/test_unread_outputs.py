@@ -11,12 +11,14 @@ from support.commands import call, data_in
 from support.cosim.native_units import native_fmu
 
 import handover
+from handover.cosim.blocks.variable import Kind
 from handover.cosim.fmu.file.description import describe_fmu
 from handover.cosim.record.reader import Record
 from handover.cosim.system.system import System
 from handover.scenarios.runs.results.output_faults import (
     MAX_LINES,
     not_finite_lines,
+    out_of_range_lines,
     outputs_not_finite,
     outputs_out_of_range,
 )
@@ -60,16 +62,23 @@ def test_a_run_with_finite_outputs_tells_nothing(tmp_path: Path):
 
 def test_outputs_beyond_their_range_are_named_with_the_first_time(tmp_path: Path):
     d, wired = describe_fmu(native_fmu("gain", 3)), System()
-    limited = {f"y{n}": replace(d.outputs["y"], name=f"y{n}", minimum=0.0, maximum=1.0) for n in range(MAX_LINES + 3)}
+    y = d.outputs["y"]
+    limited = {f"y{n}": replace(y, name=f"y{n}", minimum=0.0, maximum=1.0) for n in range(MAX_LINES + 3)}
+    limited["n"] = replace(y, name="n", kind=Kind.INTEGER, minimum=None, maximum=3.0)
+    limited["p"] = replace(y, name="p", shape=(2,), minimum=-1.0)
     wired.add("a", replace(d, outputs=limited))
-    columns = {f"a.{name}": [0.0, 1.0 + 1e-12, 1.5, -2.0] for name in limited}
+    time = [0.0, 0.1, 0.2, 0.3]
+    columns = {f"a.{name}": [0.0, float("inf"), 1.5, -2.0] for name in limited if name[0] == "y"}
+    more = {"a.n": [0.0, 3.0, 4.0, 0.0], "a.p[1]": [0.0, 0.0, 0.0, -3.0], "a.p[2]": [0.0, -2.0, 0.0, 0.0]}
     file = tmp_path / "signals.parquet"
-    lines = outputs_out_of_range(record(file, **{"time": [0.0, 0.1, 0.2, 0.3], **columns}), wired)
-    assert lines[0] == "a.y0 = 1.5 at t = 0.2 s, beyond its range, from 0 to 1"
-    assert lines[MAX_LINES:] == ["3 more outputs go beyond the declared range"]
-    columns = {f"a.{name}": [-1e-12, 0.5] for name in limited}
-    assert len(outputs_out_of_range(record(file, time=[0.0, 0.1], **columns), wired)) == MAX_LINES + 1
-    assert outputs_out_of_range(record(file, time=[0.0], **{"a.y0": [1.0]}), wired) == []
+    found = outputs_out_of_range(record(file, time=time, **columns, **more), wired)
+    assert [(f["value"], f["time"]) for f in found] == [(1.5, 0.2)] * (MAX_LINES + 3) + [(4.0, 0.2), (-2.0, 0.1)]
+    assert found[-1]["index"] == "[2]"
+    lines = out_of_range_lines(found)
+    assert lines[0] == "unit a: y0 = 1.5 at t = 0.2 s, beyond its range, from 0 to 1"
+    assert (len(lines), lines[-1].partition(":")[0]) == (MAX_LINES + 1, "5 more outputs go beyond the declared range")
+    rounded = record(file, time=[0.0, 0.1], **{"a.y0": [-1e-17, float(np.float32(1.0000001))], "a.n": [3.0, -9.0]})
+    assert outputs_out_of_range(rounded, wired) == []
 
 
 def record(file: Path, **columns: list[float]) -> Path:
