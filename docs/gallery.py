@@ -44,10 +44,10 @@ _OF_CAMPAIGNS = ("cli.paper", "cli.campaign", "published.catalog", "runs.campaig
 
 _POINTS: Mapping[str, Sequence[int]] = {
     "flyer-approaches": range(0, 500, 50),
-    "flyer-controllers": range(0, 24, 2),
+    "flyer-controllers": (6, 8, 10, 74),
     "flyer-handover": (0, 3, 6, 9, 18, 21),
     "flyer-impedance": range(12),
-    "flyer-navigation": (0, 2, 32, 36, 40, 84, 88, 92),
+    "flyer-navigation": (0, 2),
     "flyer-stability": range(30, 45, 3),
     "flyer-study": (20, 28),
     "helix-1": (8,),
