@@ -561,7 +561,7 @@ class System:
     def _described(self, path: Path) -> FmuDescription:
         if str(path).isidentifier() and not path.exists():
             raise InvalidFmu(path, f"there is no such file; a unit of the catalog is handover.unit({str(path)!r})")
-        key = path, _state(path)  # an FMU that was built anew is another one
+        key = path, _state(path)  # a rebuilt FMU is another one
         if key not in self._descriptions:
             self._descriptions[key] = describe_fmu(path)
         return self._descriptions[key]

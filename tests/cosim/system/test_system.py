@@ -263,7 +263,7 @@ def test_a_number_is_not_true(fmu: FmuOf):
     assert ["True" in fault for fault in faults_of(s)] == [True]
 
 
-def test_an_fmu_that_was_built_anew_is_read_anew(tmp_path: Path):
+def test_a_rebuilt_fmu_is_read_again(tmp_path: Path):
     file, s = tmp_path / "a.fmu", System()
     for block in ("mass", "gain"):
         file.write_bytes(native_fmu(block).read_bytes())
